@@ -69,10 +69,10 @@ def unforeseen_message(task: str, error: BaseException) -> str:
     error : BaseException
         What ended it.
     """
-    said = " ".join(str(error).split())
-    said = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    words = " ".join(str(error).split())
+    words = f"{type(error).__name__}: {words}" if words else type(error).__name__
     return (
-        f"{task} failed on something nobody foresaw ({said:.300}). The fault is the "
+        f"{task} failed on something nobody foresaw ({words:.300}). The fault is the "
         "program's, not yours: please report this line, your command and what it prints with "
         "--debug to its authors."
     )
@@ -210,10 +210,10 @@ def _tell_error(message: str) -> None:
 def _named_streams(message: str) -> str:
     """Return a message that calls stdin and stdout so, not by the files that stand for them."""
     context = click.get_current_context(silent=True)
-    known = {} if context is None else context.meta
+    streams = {} if context is None else context.meta
     for key in STREAMS:
-        if key in known:
-            message = message.replace(str(known[key]), key.rpartition(".")[2])
+        if key in streams:
+            message = message.replace(str(streams[key]), key.rpartition(".")[2])
     return message
 
 

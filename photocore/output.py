@@ -96,10 +96,10 @@ def check_all_writable(*paths: Path | None, overwrite: bool) -> None:
     overwrite : bool
         Replace existing files.
     """
-    given = [path for path in paths if path is not None]
-    for number, path in enumerate(given):
+    targets = [path for path in paths if path is not None]
+    for number, path in enumerate(targets):
         check_writable(path, overwrite=overwrite)
-        if path.resolve() in [other.resolve() for other in given[:number]]:
+        if path.resolve() in [earlier.resolve() for earlier in targets[:number]]:
             raise InputError(f"{path}: is named for two outputs; name two files.")
 
 
@@ -122,10 +122,10 @@ def check_not_input(path: Path | None, *inputs: Path | str | None) -> None:
     """
     if path is None or not path.exists():
         return
-    for given in inputs:
-        if given is not None and Path(given).exists() and path.samefile(given):
-            other = free_path(path.parent, f"{path.stem}-result", path.suffix).name
-            raise InputError(remark("output.is_read", of=path, other=other))
+    for source in inputs:
+        if source is not None and Path(source).exists() and path.samefile(source):
+            free = free_path(path.parent, f"{path.stem}-result", path.suffix).name
+            raise InputError(remark("output.is_read", of=path, other=free))
 
 
 def check_ending(path: Path | None, rule: str, *endings: str) -> None:
@@ -330,10 +330,11 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
         with told_as(path, temporary):
             yield temporary
         files = [item.relative_to(temporary) for item in temporary.rglob("*") if item.is_file()]
-        taken = [str(name) for name in files if os.path.lexists(path / name)]
-        if taken and not overwrite:
+        existing = [str(name) for name in files if os.path.lexists(path / name)]
+        if existing and not overwrite:
             raise InputError(
-                f"{path}: holds {', '.join(sorted(taken)[:5])} already; add --overwrite to replace."
+                f"{path}: holds {', '.join(sorted(existing)[:5])} already; "
+                "add --overwrite to replace."
             )
         is_new = is_new and not path.exists()
         for name in files:
@@ -360,13 +361,13 @@ def atomic_folder(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
                     folder.rmdir()
 
 
-def _make_folder(path: Path, made: list[Path]) -> None:
+def _make_folder(path: Path, folders: list[Path]) -> None:
     """Make a folder and those above it that are missing; note which."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     for folder in reversed(missing):
         with interrupts.held():
             folder.mkdir(exist_ok=True)
-            made.append(folder)
+            folders.append(folder)
             interrupts.made_folders.append(folder)
 
 

@@ -69,8 +69,8 @@ class Provenance:
         """Return it as plain data, without what is empty."""
         inputs = [{"file": name, "sha256": digest} for name, digest in self.inputs]
         more = {"command": self.command, "inputs": inputs}
-        known = {key: value for key, value in more.items() if value}
-        return {"program": self.program, "date": self.date, **known}
+        facts = {key: value for key, value in more.items() if value}
+        return {"program": self.program, "date": self.date, **facts}
 
     def lines(self) -> list[str]:
         """Return it as lines of text."""
@@ -253,8 +253,8 @@ class FileHashes:
         self._known: dict[str, list[object]] = {}
         if memory is not None:
             with suppress(OSError, ValueError):
-                known = json.loads(memory.read_text(encoding="utf-8"))
-                self._known = known if isinstance(known, dict) else {}
+                hashes = json.loads(memory.read_text(encoding="utf-8"))
+                self._known = hashes if isinstance(hashes, dict) else {}
         self._changed = False
 
     def __call__(self, path: Path) -> str:
@@ -265,9 +265,9 @@ class FileHashes:
             raise InputError(f"{path}: {(error.strerror or str(error)).lower()}.") from error
         mark = [state.st_size, state.st_mtime_ns, state.st_ino]
         name = str(path.absolute())
-        known = self._known.get(name)
-        if isinstance(known, list) and known[:3] == mark:
-            return str(known[3])
+        entry = self._known.get(name)
+        if isinstance(entry, list) and entry[:3] == mark:
+            return str(entry[3])
         digest = file_hash(path)
         if time.time() - state.st_mtime > RACY_SECONDS:
             self._known[name] = [*mark, digest]

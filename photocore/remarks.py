@@ -51,8 +51,8 @@ class Remark(str):
     def stop(self) -> None:
         """Say that nothing was made."""
         self.level = "stop"
-        for _, told in _within(self):
-            told.level = "stop"
+        for _, part in _within(self):
+            part.level = "stop"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _remembered, (str(self), self.key, dict(self.values), self.level)
@@ -63,14 +63,14 @@ _MADE: dict[str, Remark] = {}
 
 
 def _remembered(text: str, key: str, values: Mapping[str, object], level: str) -> Remark:
-    told = Remark(text)
-    told.key, told.values, told.level = key, values, level
+    remark = Remark(text)
+    remark.key, remark.values, remark.level = key, values, level
     if len(text) >= _SHORTEST:
         _MADE.pop(text, None)
-        _MADE[text] = told
+        _MADE[text] = remark
         if len(_MADE) > _REMEMBERED:
             del _MADE[next(iter(_MADE))]
-    return told
+    return remark
 
 
 def _within(text: str) -> Iterator[tuple[int, Remark]]:
@@ -98,7 +98,7 @@ def keys_in(text: str) -> set[str]:
     >>> keys_in(f"survey.xlsx: {text}")
     {'survey.off_radial_more'}
     """
-    return {told.key for _, told in _within(text)}
+    return {part.key for _, part in _within(text)}
 
 
 def level_of(text: str) -> str:
@@ -109,7 +109,7 @@ def level_of(text: str) -> str:
     >>> level_of(f"survey.xlsx: {Remarks('bifocal')('survey.off_radial_more', count=3)}")
     'doubt'
     """
-    return min((told.level for _, told in _within(text)), key=LEVELS.index, default="hint")
+    return min((part.level for _, part in _within(text)), key=LEVELS.index, default="hint")
 
 
 def alarms_in(texts: Iterable[str]) -> list[str]:
@@ -149,11 +149,11 @@ def with_keys(value: dict[str, object]) -> dict[str, object]:
 def learn(value: Any) -> None:
     """Remember the remarks of an object read from JSON."""
     held = value.get(KEYS) if isinstance(value, dict) else None
-    for text, told in (held if isinstance(held, dict) else {}).items():
-        if isinstance(told, dict) and isinstance(told.get("values"), dict):
-            level = told.get("level")
+    for text, entry in (held if isinstance(held, dict) else {}).items():
+        if isinstance(entry, dict) and isinstance(entry.get("values"), dict):
+            level = entry.get("level")
             level = level if level in LEVELS else "doubt"
-            _remembered(text, str(told.get("key")), told["values"], level)
+            _remembered(text, str(entry.get("key")), entry["values"], level)
 
 
 def _plain(value: Any) -> Any:
@@ -214,11 +214,11 @@ class Remarks:
     def __call__(self, key: str, /, *, of: object = "", **values: Any) -> Remark:
         """Return a remark by its key, its blanks filled, behind the place that it is about."""
         words = self.texts[key]["en"].format(**values)
-        told = _remembered(words, key, values, self.levels.get(key, "doubt"))
+        remark = _remembered(words, key, values, self.levels.get(key, "doubt"))
         if not of:
-            return told
+            return remark
         placed = Remark(f"{of}: {words}")
-        placed.key, placed.values, placed.level = told.key, told.values, told.level
+        placed.key, placed.values, placed.level = remark.key, remark.values, remark.level
         return placed
 
     def in_language(self, text: str, language: str) -> str:
@@ -233,19 +233,19 @@ class Remarks:
         if language == LANGUAGES[0]:
             return str(text)
         parts, end = "", 0
-        for place, told in _within(text):
-            parts += text[end:place] + self._worded(told, language)
-            end = place + len(told)
+        for place, part in _within(text):
+            parts += text[end:place] + self._worded(part, language)
+            end = place + len(part)
         return parts + text[end:]
 
-    def _worded(self, told: Remark, language: str) -> str:
-        if told.key not in self.texts:
-            return str(told)
+    def _worded(self, part: Remark, language: str) -> str:
+        if part.key not in self.texts:
+            return str(part)
         parts = ""
-        for literal, name, form, mark in Formatter().parse(self.texts[told.key][language]):
+        for literal, name, form, mark in Formatter().parse(self.texts[part.key][language]):
             parts += literal
             if name is not None:
-                value = told.values.get(name, "")
+                value = part.values.get(name, "")
                 value = repr(value) if mark == "r" else value
                 parts += self._blank(value, form or "", language, is_word=mark == "s")
         return parts

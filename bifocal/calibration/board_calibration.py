@@ -144,12 +144,12 @@ class _LensFit:
         return float(self.lens.sigma0 or 0.0)
 
 
-def _solve(views: Sequence[BoardView], size: tuple[int, int], wanted: str) -> _LensFit:
+def _solve(views: Sequence[BoardView], size: tuple[int, int], model: str) -> _LensFit:
     """Return the adjustment with the wanted model, or with the one that the data justify."""
-    if wanted == "fisheye":
+    if model == "fisheye":
         return _solve_fisheye(views, size)
     models = _distortion_terms()
-    names = list(models) if wanted == "auto" else [wanted]
+    names = list(models) if model == "auto" else [model]
     fits = {name: _solve_brown(views, size, name, *models[name]) for name in names}
     best = fits[names[0]]
     observations = 2 * sum(len(view.pixels) for view in views)
@@ -162,7 +162,7 @@ def _solve(views: Sequence[BoardView], size: tuple[int, int], wanted: str) -> _L
         if gain > fdtri(more, freedom, 1 - SIGNIFICANCE):
             best = fits[name]
     tried = tuple((name, each.rms) for name, each in fits.items())
-    if wanted == "auto" and _field_of_view(best.lens.camera_matrix, size) > 100:
+    if model == "auto" and _field_of_view(best.lens.camera_matrix, size) > 100:
         with suppress(GeometryError):  # then the others stand
             fisheye = _solve_fisheye(views, size)
             tried = (*tried, ("fisheye", fisheye.rms))

@@ -117,16 +117,16 @@ def lens_from_database(
     return DatabaseLens(lens=lens, name=glass.model, axis_scale=axis_scale, corner_shift=shift)
 
 
-def _camera(database: Any, info: ImageInfo, wanted: str) -> Any:
+def _camera(database: Any, info: ImageInfo, name: str) -> Any:
     """Return the one camera that EXIF or the user names."""
-    maker, model = (info.make, wanted or info.model)
+    maker, model = (info.make, name or info.model)
     if not model:
         raise InputError(f"{info.path}: EXIF names no camera; give --camera-name.")
     bodies = database.find_cameras(maker or None, model, loose_search=True)
     # The search is by likeness ("iPhone 12" finds an iPhone 5): only the same name is the camera.
     same = {model.lower(), f"{maker} {model}".lower()}
     exact = [item for item in bodies if item.model.lower() in same]
-    if exact or (wanted and bodies):
+    if exact or (name and bodies):
         return (exact or bodies)[0]
     near = ", ".join(sorted({item.model for item in bodies[:8]})) or "nothing similar"
     raise InputError(

@@ -135,7 +135,7 @@ def write_survey_file(
     out: Path,
     folder: Path,
     pairs: Sequence[PhotoPair],
-    left: Sequence[Path],
+    unpaired: Sequence[Path],
     *,
     overwrite: bool = False,
 ) -> None:
@@ -163,8 +163,8 @@ def write_survey_file(
             lines.append('control = ""   # table of control points; or auto = true and distance1')
         else:
             lines.append(f"control = {_quoted(relative_name(control, out.parent))}")
-    if left:
-        names = ", ".join(path.name for path in left)
+    if unpaired:
+        names = ", ".join(path.name for path in unpaired)
         lines += ["", f"# In no pair: {names}"]
     with atomic_path(out, overwrite=overwrite) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -54,12 +54,12 @@ def found_anywhere(job: PairJob) -> PairJob:
     return _moved(job, Path.absolute)
 
 
-def _moved(job: PairJob, there: Callable[[Path], Path]) -> PairJob:
+def _moved(job: PairJob, place: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
-    files = {role: there(path) for role, path in job.files.items()}
-    paths: dict[str, Any] = {name: there(getattr(job, name)) for name in ("folder", "far", "near")}
-    paths["more"] = tuple(map(there, job.more))
-    return replace(job, files=files, joint=job.joint and there(job.joint), **paths)
+    files = {role: place(path) for role, path in job.files.items()}
+    paths: dict[str, Any] = {name: place(getattr(job, name)) for name in ("folder", "far", "near")}
+    paths["more"] = tuple(map(place, job.more))
+    return replace(job, files=files, joint=job.joint and place(job.joint), **paths)
 
 
 def packed(job: PairJob) -> Parcel:

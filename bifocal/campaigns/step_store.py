@@ -206,20 +206,20 @@ def receive_step(
             (place / name).write_bytes(content)
 
 
-def remove_made(folder: Path, made: Mapping[str, str], hashes: FileHashes) -> list[str]:
+def remove_made(folder: Path, outputs: Mapping[str, str], hashes: FileHashes) -> list[str]:
     """Remove a step's unchanged files and its record; return the files that are not ours, or stay.
 
     Parameters
     ----------
     folder : Path
-    made : mapping of str to str
+    outputs : mapping of str to str
         Files that the step made, and their SHA-256.
     hashes : FileHashes
     """
     kept = []
     for name in _files(folder):
         path = folder / name
-        if made.get(name.as_posix()) == hashes(path):
+        if outputs.get(name.as_posix()) == hashes(path):
             with suppress(OSError):  # open in another program
                 path.unlink()
                 continue

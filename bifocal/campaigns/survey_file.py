@@ -39,10 +39,10 @@ def mosaic_wanted(path: Path) -> dict[str, Any] | None:
     return _options_of_mosaic(mosaic, []) if isinstance(mosaic, dict) else {} if mosaic else None
 
 
-def _options_of_mosaic(said: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+def _options_of_mosaic(table: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     """Return what is said of the mosaic, noting what is wrong."""
     options, values = options_of(MosaicCommand), {}
-    for key, value in said.items():
+    for key, value in table.items():
         try:
             if key not in OF_MOSAIC:
                 raise ValueError(f"no such key there, but {', '.join(OF_MOSAIC)}")

@@ -283,16 +283,16 @@ def _made(jobs: Sequence[PairJob], machines: Machines, listener: _Count) -> dict
     return {outcome.name: outcome for outcome in listener.outcomes}
 
 
-def _without_leftovers(job: PairJob, made: PairOutcome) -> PairOutcome:
+def _without_leftovers(job: PairJob, outcome: PairOutcome) -> PairOutcome:
     """Remove what a pair's folder held before and does not belong to it any more, and say so.
 
     A pair that failed may go on from there, unless what was there was to be overwritten.
     """
-    if made.failed_step and not (job.overwrite and made.done):
-        return made
-    sentences = remove_leftovers(job, (*made.done, *made.kept))
-    message = "\n".join((made.message, *sentences)) if made.failed_step else made.message
-    return replace(made, message=message, remarks=(*made.remarks, *sentences))
+    if outcome.failed_step and not (job.overwrite and outcome.done):
+        return outcome
+    sentences = remove_leftovers(job, (*outcome.done, *outcome.kept))
+    message = "\n".join((outcome.message, *sentences)) if outcome.failed_step else outcome.message
+    return replace(outcome, message=message, remarks=(*outcome.remarks, *sentences))
 
 
 def _aligned(

@@ -109,9 +109,9 @@ def command(
         remark(f"Set of photos written to {out}")
 
 
-def _lines(made: ProjectPhotos) -> Iterator[str]:
+def _lines(photos: ProjectPhotos) -> Iterator[str]:
     """Yield what was made for people."""
-    yield f"{made.program}: {len(made.photos)} photos of the wall; scale: {made.scale}."
-    yield from (f"  {wall}" for wall in made.walls)
-    for photo in made.photos.photos:
+    yield f"{photos.program}: {len(photos.photos)} photos of the wall; scale: {photos.scale}."
+    yield from (f"  {wall}" for wall in photos.walls)
+    for photo in photos.photos.photos:
         yield f"  {photo.name:>16}  {photo.distance:8.3f} m from the wall"

@@ -65,7 +65,7 @@ def difference_of(before: ReliefMap, after: ReliefMap) -> tuple[ReliefMap, BoolA
 
 
 def _two_surfaces(
-    base: ReliefMap, other: ReliefMap, sigma: FloatArray, known: BoolArray
+    base: ReliefMap, second: ReliefMap, sigma: FloatArray, valid: BoolArray
 ) -> BoolArray:
     """Return where each map shows, nearby, the surface that the other one shows here.
 
@@ -74,24 +74,24 @@ def _two_surfaces(
     gsd = base.gsd
     reach = round(CHANGE.beside / gsd)
     # Sigma beside a step is nearly the step's own half: the wall's usual one says what is noise.
-    least = np.fmax(3 * sigma, CHANGE.apart * float(np.median(sigma[known])))
-    far = known & (np.abs(other.r - base.r) > least)
+    least = np.fmax(3 * sigma, CHANGE.apart * float(np.median(sigma[valid])))
+    far = valid & (np.abs(second.r - base.r) > least)
     rows, columns = np.nonzero(far)
     if not reach or not len(rows):
-        return np.zeros_like(known)
+        return np.zeros_like(valid)
     step = max(1, reach // 8)
     offsets = np.arange(-reach, reach + 1, step)
     met = np.zeros((2, len(rows)), np.int64)
-    step_here = np.abs(other.r - base.r)[rows, columns]
+    step_here = np.abs(second.r - base.r)[rows, columns]
     tolerance = np.fmax(3 * sigma[rows, columns], CHANGE.round * step_here)
     # What is interpolated beside a step is of one of its two surfaces, too.
-    padded = [np.pad(one.r, reach, constant_values=np.nan) for one in (base, other)]
+    padded = [np.pad(one.r, reach, constant_values=np.nan) for one in (base, second)]
     for dy in offsets:
         for dx in offsets[np.hypot(offsets, dy) <= reach]:
-            for k, here in enumerate((other, base)):
+            for k, here in enumerate((second, base)):
                 shifted = padded[k][rows + reach + dy, columns + reach + dx]
                 met[k] += np.abs(shifted - here.r[rows, columns]) <= tolerance
-    two = np.zeros_like(known)
+    two = np.zeros_like(valid)
     two[rows, columns] = (met >= CHANGE.met * len(offsets) ** 2).all(axis=0)
     return two
 

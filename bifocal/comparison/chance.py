@@ -75,10 +75,10 @@ class Patches:
         Standard deviations of the patches. [cells]
     """
 
-    def __init__(self, known: BoolArray, radii: Sequence[float]) -> None:
-        self.known, self.radii = known, tuple(radii)
-        weights = [self._smooth(known.astype(float), radius) for radius in radii]
-        self.shares = [np.where(known & (w > CHANCE.covered), w, np.nan) for w in weights]
+    def __init__(self, valid: BoolArray, radii: Sequence[float]) -> None:
+        self.known, self.radii = valid, tuple(radii)
+        weights = [self._smooth(valid.astype(float), radius) for radius in radii]
+        self.shares = [np.where(valid & (w > CHANCE.covered), w, np.nan) for w in weights]
 
     def averages(self, field: FloatArray) -> list[FloatArray]:
         """Return the averages of a field over the patches of each radius."""

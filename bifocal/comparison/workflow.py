@@ -128,8 +128,8 @@ def compare_files(
         progress(0.1, 1, "reading")
         maps = [ReliefMap.read(path) for path in paths]
         progress(0.2, 1, "testing")
-        one, other = map(photos_at_hand, (before, after), paths)
-        both = None if one is None or other is None else (one, other)
+        first, second = map(photos_at_hand, (before, after), paths)
+        both = None if first is None or second is None else (first, second)
         done = compare(maps[0], maps[1], stable=polygons, fit=fit, smallest=smallest, dates=both)
         if done.regions and both is None:
             done = replace(done, remarks=(*done.remarks, remark("compare.maps_alone")))

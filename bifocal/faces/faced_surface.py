@@ -188,8 +188,13 @@ def _noise(sigma: Float32Array) -> float:
     return float(np.quantile(finite, EDGES.best)) if finite.size else 0.0
 
 
-def _touch(one: Bounds, other: Bounds) -> bool:
-    return one[0] <= other[2] and one[2] >= other[0] and one[1] <= other[3] and one[3] >= other[1]
+def _touch(first: Bounds, second: Bounds) -> bool:
+    return (
+        first[0] <= second[2]
+        and first[2] >= second[0]
+        and first[1] <= second[3]
+        and first[3] >= second[1]
+    )
 
 
 def _nearest(values: Float32Array, clean: BoolArray) -> tuple[Float32Array, Float32Array]:

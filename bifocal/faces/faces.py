@@ -265,8 +265,8 @@ def _corners(rows: Any, least: int) -> FloatArray:
     return corners
 
 
-def _number(said: Mapping[str, Any], key: str) -> float | None:
-    value = said.get(key)
+def _number(properties: Mapping[str, Any], key: str) -> float | None:
+    value = properties.get(key)
     if value is None:
         return None
     if isinstance(value, bool) or not abs(float(value)) <= LARGEST:

@@ -54,10 +54,10 @@ def beside(source: Path | str) -> Path:
     return path.with_name(without_ending(path.name) + ENDING)
 
 
-def faces_path(given: Path | None, *sources: object) -> Path | None:
+def faces_path(faces: Path | None, *sources: object) -> Path | None:
     """Return the file of faces that is given, else the first kept beside a source; None: none."""
-    if given is not None:
-        return None if given.name == NONE else given
+    if faces is not None:
+        return None if faces.name == NONE else faces
     places = [beside(source) for source in sources if isinstance(source, Path | str)]
     return next((place for place in places if place.exists()), None)
 
@@ -109,16 +109,16 @@ def _shown(photo: Photo) -> tuple[FloatArray, FloatArray] | None:
     return (places.min(axis=0), places.max(axis=0)) if np.isfinite(places).all() else None
 
 
-def keep_faces(given: Path | None, source: Path) -> tuple[str, ...]:
+def keep_faces(faces: Path | None, source: Path) -> tuple[str, ...]:
     """Keep faces that are given for the first time beside the pair, for later runs; say so."""
-    if given is None or given.name == NONE or not source.is_file():
+    if faces is None or faces.name == NONE or not source.is_file():
         return ()
     kept = beside(source)
     if not kept.exists():
         with suppress(InputError, OSError):  # a folder that cannot be written keeps nothing
-            read_faces(given).write(kept)
+            read_faces(faces).write(kept)
             return (remark("faces.kept", name=kept.name),)
-    elif kept.resolve() != given.resolve():
+    elif kept.resolve() != faces.resolve():
         return (remark("faces.others_kept", name=kept.name),)
     return ()
 

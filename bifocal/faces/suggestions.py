@@ -45,7 +45,7 @@ def suggest_faces(relief: ReliefMap, photos: Sequence[Photo], images: Sequence[P
     """
     greys = [as_grey(image, "image") for image in images]
     grid, lost = relief.grid, _lost(relief)
-    found = []
+    faces = []
     for mask in (lost, *_slabs(relief)):
         for box in _boxes(mask):
             drawn = _drawn_to_edges(box, relief, photos[0], greys[0])
@@ -53,11 +53,11 @@ def suggest_faces(relief: ReliefMap, photos: Sequence[Photo], images: Sequence[P
             if mends < SUGGESTIONS.least:
                 continue
             if (face := _face_of(relief, grid, drawn, photos, greys)) is not None:
-                found.append((float(mends), face))
-    found.sort(key=lambda one: -one[0])
+                faces.append((float(mends), face))
+    faces.sort(key=lambda one: -one[0])
     kept: list[Face] = []
-    for mends, face in found:
-        if len(kept) < SUGGESTIONS.most and all(_apart(face, other) for other in kept):
+    for mends, face in faces:
+        if len(kept) < SUGGESTIONS.most and all(_apart(face, chosen) for chosen in kept):
             kept.append(
                 Face(name=f"S{len(kept) + 1}", rings=face.rings, plane=face.plane,
                      sigma=face.sigma, mends=round(mends, 5))
@@ -131,13 +131,13 @@ def _drawn_to_edges(box: Box, relief: ReliefMap, photo: Photo, grey: ByteArray) 
     )
     inner = relief.r[top:bottom, left:right]
     level = float(np.nanmedian(inner)) if np.isfinite(inner).any() else 0.0
-    seen = _seen(photo, grey, grid, level)
-    if not np.isfinite(seen).all():
+    visible = _seen(photo, grey, grid, level)
+    if not np.isfinite(visible).all():
         return box
     sides = []
     for axis, (low, high) in ((1, (left, right)), (0, (top, bottom))):
         # Signed steps add up along a straight edge and cancel on texture.
-        part = seen[reach:-reach] if axis == 1 else seen[:, reach:-reach].T
+        part = visible[reach:-reach] if axis == 1 else visible[:, reach:-reach].T
         rise = np.abs(np.diff(cv2.GaussianBlur(part, (0, 0), 1.0), axis=1).mean(axis=0))
         near = rise[: 2 * reach], rise[len(rise) - 2 * reach :]
         first = low - reach + 1 + int(near[0].argmax())
@@ -167,7 +167,7 @@ def _face_of(
     coarse = Grid.from_bounds((x0, y0, x1, y1), gsd=max(grid.gsd, (x1 - x0) / SUGGESTIONS.places))
     scores = np.array([_agreement(photos, greys, coarse, level) for level in levels])
     best = int(scores.argmax())
-    score, known = float(scores[best]), measured[row, column]
+    score, measured_share = float(scores[best]), measured[row, column]
     # The photos alone tell the level where no other is as good.
     level, spread = float(levels[best]), SUGGESTIONS.step
     rivals = scores[np.abs(levels - level) > SUGGESTIONS.apart]
@@ -175,11 +175,13 @@ def _face_of(
         score > max(rivals.max(), SUGGESTIONS.alone - SUGGESTIONS.clearly) + SUGGESTIONS.clearly
     )
     certain &= 0 < best < len(levels) - 1
-    if not certain and len(known) >= SUGGESTIONS.support:  # else what was measured, if they agree
-        xyr = np.column_stack([column * grid.gsd, -row * grid.gsd, known])
+    if (
+        not certain and len(measured_share) >= SUGGESTIONS.support
+    ):  # else what was measured, if they agree
+        xyr = np.column_stack([column * grid.gsd, -row * grid.gsd, measured_share])
         plane, _ = robust_plane(xyr, grid.gsd)
         level = float(plane @ [1, (right - left) * grid.gsd / 2, (top - bottom) * grid.gsd / 2])
-        away = np.abs(known - level)
+        away = np.abs(measured_share - level)
         spread = max(float(np.quantile(away, 0.3)), 0.001)
         certain = (away < 2 * SUGGESTIONS.step).mean() > SUGGESTIONS.supported
         least = max(score - SUGGESTIONS.clearly, SUGGESTIONS.agreement)
@@ -193,18 +195,18 @@ def _agreement(
     photos: Sequence[Photo], greys: Sequence[ByteArray], grid: Grid, level: float
 ) -> float:
     """Return the correlation of what the first two photos that see a level show of it; -1: none."""
-    seen = []
+    patches = []
     for photo, grey in zip(photos, greys, strict=True):
         picture = _seen(photo, grey, grid, level)
         if np.isfinite(picture).mean() > SUGGESTIONS.framed:
-            seen.append(picture)
-    if len(seen) < 2:
+            patches.append(picture)
+    if len(patches) < 2:
         return -1.0
-    both = np.isfinite(seen[0]) & np.isfinite(seen[1])
-    one, other = (cv2.GaussianBlur(np.nan_to_num(p), (0, 0), 1.0)[both] for p in seen[:2])
-    one, other = one - one.mean(), other - other.mean()
-    size = float(np.sqrt((one @ one) * (other @ other)))
-    return float(one @ other) / size if size > 0 else -1.0
+    both = np.isfinite(patches[0]) & np.isfinite(patches[1])
+    first, second = (cv2.GaussianBlur(np.nan_to_num(p), (0, 0), 1.0)[both] for p in patches[:2])
+    first, second = first - first.mean(), second - second.mean()
+    size = float(np.sqrt((first @ first) * (second @ second)))
+    return float(first @ second) / size if size > 0 else -1.0
 
 
 def _seen(photo: Photo, grey: ByteArray, grid: Grid, level: float) -> Float32Array:
@@ -219,8 +221,8 @@ def _seen(photo: Photo, grey: ByteArray, grid: Grid, level: float) -> Float32Arr
     return np.where(framed, picture, np.float32(np.nan))
 
 
-def _apart(one: Face, other: Face) -> bool:
+def _apart(first: Face, second: Face) -> bool:
     """Whether two boxes share no part."""
-    (left, low), (right, high) = one.rings[0].min(axis=0), one.rings[0].max(axis=0)
-    (west, south), (east, north) = other.rings[0].min(axis=0), other.rings[0].max(axis=0)
+    (left, low), (right, high) = first.rings[0].min(axis=0), first.rings[0].max(axis=0)
+    (west, south), (east, north) = second.rings[0].min(axis=0), second.rings[0].max(axis=0)
     return bool(left >= east or right <= west or low >= north or high <= south)

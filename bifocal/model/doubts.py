@@ -100,7 +100,7 @@ def unit_of(extra: Mapping[str, object]) -> str:
     )
 
 
-def untold(told: Iterable[str], remarks: Iterable[str]) -> list[str]:
+def untold(sentences: Iterable[str], remarks: Iterable[str]) -> list[str]:
     """Return the remarks that were not told before, be it without the file they are of.
 
     Examples
@@ -108,7 +108,7 @@ def untold(told: Iterable[str], remarks: Iterable[str]) -> list[str]:
     >>> untold(["It is bent."], ["w.pair.json: It is bent.", "It leans.", "It leans."])
     ['It leans.']
     """
-    earlier = tuple(told)
+    earlier = tuple(sentences)
     new: list[str] = []
     for text in remarks:
         if not text.endswith((*earlier, *new)):

@@ -91,10 +91,10 @@ def local_contrast(image: ByteArray | Float32Array) -> Float32Array:
     return np.asarray(np.sqrt(np.maximum(square, 0)))
 
 
-def noise(image: ByteArray | Float32Array, seen: BoolArray | None = None) -> float:
+def noise(image: ByteArray | Float32Array, visible: BoolArray | None = None) -> float:
     """Return the noise of a photo (Immerkaer 1996, with the median for the mean). [grey levels]"""
     mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
     second = cv2.filter2D(image, cv2.CV_32F, mask)
-    second = second if seen is None else second[seen]
+    second = second if visible is None else second[visible]
     # Six is the mask's norm; 1.4826 makes the median of |N(0, 1)| one. Rounding is noise, too.
     return max(1.4826 / 6 * float(np.median(np.abs(second))), 0.29)

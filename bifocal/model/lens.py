@@ -165,8 +165,8 @@ class Lens:
             return self._scaled(points, inverse=False)
         flat = points.reshape(-1, 2)
         out = np.empty_like(flat)
-        for part, seen, _ in self._projected(flat):
-            out[part] = seen
+        for part, directions, _ in self._projected(flat):
+            out[part] = directions
         return out.reshape(points.shape)
 
     def distorted_by_ideal(self, pixels: ArrayLike) -> FloatArray:

@@ -189,12 +189,12 @@ def pixel_rates(photos: Sequence[PlanePhoto], xyz: FloatArray) -> tuple[FloatArr
     return np.concatenate(by_point, axis=1), np.concatenate(by_orientation, axis=1)
 
 
-def rates_of(seen: PointViews, radial: FloatArray, number: int, photos: int = 2) -> FloatArray:
+def rates_of(views: PointViews, radial: FloatArray, number: int, photos: int = 2) -> FloatArray:
     """Return how the pixels of one camera move with all that `names_of` counts, (n, 2, k).
 
     Parameters
     ----------
-    seen : PointViews
+    views : PointViews
         Of that camera.
     radial : ndarray, shape (n, 2, 2)
         By its two terms of radial distortion.
@@ -202,14 +202,14 @@ def rates_of(seen: PointViews, radial: FloatArray, number: int, photos: int = 2)
         Of the camera, from 0, and how many there are.
     """
     placing, cameras = len(PLACING), photos * len(CAMERA)
-    common = max(seen.by_media.shape[2] - placing, 0)
+    common = max(views.by_media.shape[2] - placing, 0)
     count = cameras + common + (photos * placing if common else 0)
-    rates = np.zeros((*seen.pixels.shape, count))
+    rates = np.zeros((*views.pixels.shape, count))
     first, last = number * len(CAMERA), cameras + common + number * placing
-    rates[..., first : first + len(PARAMETERS)] = seen.by_camera
+    rates[..., first : first + len(PARAMETERS)] = views.by_camera
     rates[..., first + len(PARAMETERS) : first + len(CAMERA)] = radial
-    rates[..., cameras : cameras + common] = seen.by_media[..., :common]
-    rates[..., last : last + placing] = seen.by_media[..., common:]
+    rates[..., cameras : cameras + common] = views.by_media[..., :common]
+    rates[..., last : last + placing] = views.by_media[..., common:]
     return rates
 
 

@@ -194,22 +194,22 @@ def _miss(pick: PlanePicks, xyz: FloatArray) -> FloatArray:
     return np.asarray(pick.positions - rays.plane_position(xyz, pick.foot))
 
 
-def _blank(values: FloatArray, seen: BoolArray) -> FloatArray:
+def _blank(values: FloatArray, picked: BoolArray) -> FloatArray:
     """Return values with zeros where a photo has no pick."""
-    return np.where(seen.reshape(-1, *(1,) * (values.ndim - 1)), values, 0.0)
+    return np.where(picked.reshape(-1, *(1,) * (values.ndim - 1)), values, 0.0)
 
 
-def _weights(pick: PlanePicks, seen: BoolArray) -> FloatArray:
+def _weights(pick: PlanePicks, picked: BoolArray) -> FloatArray:
     """Return the inverse covariance of plane positions, zero where there is none, (n, 2, 2)."""
-    return _blank(inverse_2x2(pick.covariance), seen)
+    return _blank(inverse_2x2(pick.covariance), picked)
 
 
 def _closest(
-    picks: Sequence[PlanePicks], weights: Sequence[FloatArray], seen: BoolArray
+    picks: Sequence[PlanePicks], weights: Sequence[FloatArray], picked: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return where the rays, lines over relief, pass each other closest, (n, 3), and cofactors."""
     rows, places = [], []
-    for pick, rows_seen in zip(picks, seen.T, strict=True):
+    for pick, rows_seen in zip(picks, picked.T, strict=True):
         ray = rays.object_rays(pick.positions, pick.foot)
         design = np.zeros((len(rows_seen), 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
@@ -236,14 +236,14 @@ def _precision_and_tests(
     photos: Sequence[Photo],
     xyz: FloatArray,
     residuals: FloatArray,
-    seen: BoolArray,
+    picked: BoolArray,
     sigmas: FloatArray,
     root: FloatArray | None,
 ) -> tuple[FloatArray, ...]:
     """Return own covariances, effect of the orientation, v'Mv, slips, what each photo's saves."""
     points, count = residuals.shape[:2]
     design, by_orientation = pixel_rates(photos, xyz)
-    rows = np.repeat(seen, 2, axis=1)
+    rows = np.repeat(picked, 2, axis=1)
     design = np.where(rows[..., None], design, 0.0)
     weight = np.where(rows, np.repeat(sigmas, 2) ** -2.0, 0.0)
     gain = design.transpose(0, 2, 1) * weight[:, None]
@@ -257,7 +257,7 @@ def _precision_and_tests(
         effect = -covariance @ gain @ rates
         spread = spread + rates @ rates.transpose(0, 2, 1)
     inverse = np.linalg.inv(spread)
-    miss = np.where(seen[..., None], residuals, 0.0).reshape(points, 2 * count, 1)
+    miss = np.where(picked[..., None], residuals, 0.0).reshape(points, 2 * count, 1)
     pull = inverse @ miss
     total = (miss * pull).sum(axis=(1, 2))
     numbers = np.arange(count)
@@ -267,7 +267,7 @@ def _precision_and_tests(
     pulls = pull.reshape(points, count, 2)
     slip = (np.linalg.inv(blocks) @ pulls[..., None])[..., 0]
     saved = (slip * pulls).sum(axis=-1)
-    blank = np.where(seen, 1.0, np.nan)
+    blank = np.where(picked, 1.0, np.nan)
     return covariance, effect, total, np.linalg.norm(slip, axis=-1) * blank, saved * blank
 
 

@@ -171,6 +171,6 @@ class MapSurface:
         return np.asarray(np.where(rough | np.isnan(smooth), near, smooth), np.float32)
 
 
-def _between(one: Float32Array, other: Float32Array, share: FloatArray) -> Float32Array:
+def _between(first: Float32Array, second: Float32Array, share: FloatArray) -> Float32Array:
     """Return what lies between two values by a share of the way; exactly both where they agree."""
-    return one + (other - one) * share.astype(np.float32)
+    return first + (second - first) * share.astype(np.float32)

@@ -59,10 +59,10 @@ def dragging_photo(adjusted: JointAdjustment) -> DraggingPhoto | None:
             without = adjust_jointly(replace(rays, sigma=weak), start)
         except PhotogrammetryError:
             continue
-        own = 2 * int((rays.camera == k).sum()) * adjusted.redundancy / (2 * len(rays.camera))
+        share = 2 * int((rays.camera == k).sum()) * adjusted.redundancy / (2 * len(rays.camera))
         squares = without.sigma0**2 * without.redundancy
         fallen = adjusted.sigma0**2 * adjusted.redundancy - squares
-        test = (fallen / own) / (squares / max(adjusted.redundancy - own, 1.0))
+        test = (fallen / share) / (squares / max(adjusted.redundancy - share, 1.0))
         if test > max(LIMIT, worst.test if worst else 0.0):
             change = [without.cameras[j].centre - adjusted.cameras[j].centre
                       for j in range(count) if j != k]  # fmt: skip

@@ -251,11 +251,11 @@ def _spread(ties: SharedPoints, shapes: Sequence[tuple[int, int]]) -> SharedPoin
 
 
 def _observed(
-    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures,
+    photos: Sequence[PhotoInput], points: SharedPoints, control: Control, site: SiteMeasures,
     first: FirstCameras,
 ) -> JointObservations:  # fmt: skip
     """Return all rays, in the frame of control, or without enough of it of the first pair."""
-    coordinates, sigma = np.full((seen.count, 3), np.nan), np.ones((seen.count, 3))
+    coordinates, sigma = np.full((points.count, 3), np.nan), np.ones((points.count, 3))
     held: dict[int, tuple[str, ...]] = {}
     one_body = len({(i.image_size, i.is_calibrated) for i in first.interiors}) == 1
     one_body &= not first.interiors[0].is_calibrated
@@ -266,9 +266,9 @@ def _observed(
         pose = ("turn X", "turn Y", "turn Z", "X", "Y", "Z")
         held = {first.far: pose, first.near: ("Z",)}
     return JointObservations(
-        names=tuple(photo.name for photo in photos), camera=seen.photo, point=seen.point,
-        pixels=seen.pixels, sigma=np.full(len(seen.photo), site.sigma_pick),
-        ids=(*control.ids, *(f"tie {k + 1}" for k in range(seen.count - len(control.ids)))),
+        names=tuple(photo.name for photo in photos), camera=points.photo, point=points.point,
+        pixels=points.pixels, sigma=np.full(len(points.photo), site.sigma_pick),
+        ids=(*control.ids, *(f"tie {k + 1}" for k in range(points.count - len(control.ids)))),
         known=coordinates, sigma_known=sigma, sigma_focal=np.zeros(len(photos)),
         cameras=CameraKnowledge(
             interiors=first.interiors, lens=first.lens, held=held, by_wall=bool(held),
@@ -396,7 +396,7 @@ def turned_set(adjusted: JointAdjustment, lines: Sequence[FacadeDirection]) -> J
 
 
 def _wall(
-    seen: JointObservations, state: JointUnknowns, control: int, sigma_tie: float
+    observations: JointObservations, state: JointUnknowns, control: int, sigma_tie: float
 ) -> tuple[BoolArray, FloatArray]:
     """Return which ties tell of the wall's plane, and by what sigma they lie on it, (p,). [m]
 
@@ -411,7 +411,7 @@ def _wall(
     camera = max(state.cameras, key=lambda one: float(one.centre[2]))
     normal = np.zeros((len(xyz), 3, 3))
     for k, own in enumerate(state.cameras):
-        points = seen.point[seen.camera == k]
+        points = observations.point[observations.camera == k]
         by = project_with_jacobian(own, xyz[points]).by_point / sigma_tie
         np.add.at(normal, points, by.transpose(0, 2, 1) @ by)
     usable = np.isfinite(xyz).all(axis=1) & (np.linalg.eigvalsh(normal)[:, 0] > 1.0)

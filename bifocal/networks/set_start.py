@@ -61,14 +61,14 @@ class FirstCameras:
 
 
 def first_cameras_of(
-    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+    photos: Sequence[PhotoInput], points: SharedPoints, control: Control, site: SiteMeasures
 ) -> FirstCameras:
     """Return first cameras of all photos.
 
     Parameters
     ----------
     photos : sequence of PhotoInput
-    seen : SharedPoints
+    points : SharedPoints
         Control points first, in their order, then ties; pixels free of the lens files' distortion.
     control, site
         As of a pair; distance 1 is that of the first photo, distance 2 of the second.
@@ -79,7 +79,7 @@ def first_cameras_of(
         If no two photos make a pair, for the reason of the most promising, or one photo shares too
         few points with the others.
     """
-    (far, near), pair = _first_pair(photos, seen, control, site)
+    (far, near), pair = _first_pair(photos, points, control, site)
     interiors = [photo.interior for photo in photos]
     interiors[far], interiors[near] = pair.observations.interiors
     lens = _lenses(interiors)
@@ -92,21 +92,21 @@ def first_cameras_of(
         elif radial.any() and not interiors[k].is_calibrated:
             interiors[k] = replace(interiors[k], sigma_radial=SIGMA_RADIAL)
     cameras = {far: pair.adjusted.cameras[0], near: pair.adjusted.cameras[1]}
-    pixels = seen.pixels.copy()
+    pixels = points.pixels.copy()
     for k, interior in enumerate(interiors):
-        rays = seen.photo == k
+        rays = points.photo == k
         pixels[rays] = interior.radial(*radial[k]).undistort(pixels[rays])
-    coordinates = np.full((seen.count, 3), np.nan)
+    coordinates = np.full((points.count, 3), np.nan)
     coordinates[: len(control.ids)] = control.xyz
     while len(cameras) < len(photos):
-        xyz = np.where(np.isfinite(coordinates), coordinates, meeting(cameras, seen, pixels))
-        placed = np.asarray(np.isfinite(xyz).all(axis=1))[seen.point]
-        count = [-1 if k in cameras else int((placed & (seen.photo == k)).sum())
+        xyz = np.where(np.isfinite(coordinates), coordinates, meeting(cameras, points, pixels))
+        placed = np.asarray(np.isfinite(xyz).all(axis=1))[points.point]
+        count = [-1 if k in cameras else int((placed & (points.photo == k)).sum())
                  for k in range(len(photos))]  # fmt: skip
         k = int(np.argmax(count))
-        rays = placed & (seen.photo == k)
+        rays = placed & (points.photo == k)
         try:
-            camera, agree = resect(xyz[seen.point[rays]], pixels[rays], interiors[k])
+            camera, agree = resect(xyz[points.point[rays]], pixels[rays], interiors[k])
         except GeometryError:
             agree = np.zeros(1, dtype=bool)
         if agree.sum() < min(FEWEST_MATCHES, max(len(agree), 4)) or agree.mean() < 0.5:
@@ -121,11 +121,11 @@ def first_cameras_of(
             whole, centre = cameras[leader].matrix, cameras[k].matrix[:2, 2]
             matrix = camera_matrix(whole[0, 0], whole[1, 1] / whole[0, 0], *centre)
             cameras[k], radial[k] = cameras[k]._replace(matrix=matrix), radial[leader]
-    xyz = meeting(cameras, seen, pixels)
+    xyz = meeting(cameras, points, pixels)
     middle, unknown = np.nanmedian(xyz, axis=0), np.asarray(np.isnan(xyz).any(axis=1))
     for k, camera in cameras.items():  # what is seen under too small an angle stands on the wall
-        rays = np.flatnonzero((seen.photo == k) & unknown[seen.point])
-        xyz[seen.point[rays]] = ray_on_plane(camera, pixels[rays])
+        rays = np.flatnonzero((points.photo == k) & unknown[points.point])
+        xyz[points.point[rays]] = ray_on_plane(camera, pixels[rays])
     return FirstCameras(
         far=far, near=near, pair=pair, cameras=tuple(cameras[k] for k in range(len(photos))),
         interiors=tuple(interiors), lens=lens, radial=radial,
@@ -134,11 +134,11 @@ def first_cameras_of(
 
 
 def _first_pair(
-    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+    photos: Sequence[PhotoInput], points: SharedPoints, control: Control, site: SiteMeasures
 ) -> tuple[tuple[int, int], OrientedPair]:
     """Return the best pair that today's way orients, and its photos, the far one first."""
     reasons: list[GeometryError | ConvergenceError] = []
-    for one, second in _promising(photos, seen, control, site)[:TRIED]:
+    for one, second in _promising(photos, points, control, site)[:TRIED]:
         for far, near in ((one, second), (second, one)):
             try:
                 pair = orient_pair(
@@ -166,14 +166,14 @@ def _measures(site: SiteMeasures, far: int, near: int) -> SiteMeasures:
 
 
 def _promising(
-    photos: Sequence[PhotoInput], seen: SharedPoints, control: Control, site: SiteMeasures
+    photos: Sequence[PhotoInput], points: SharedPoints, control: Control, site: SiteMeasures
 ) -> list[tuple[int, int]]:
     """Return the pairs that may be oriented, those whose rays meet best first.
 
     Of each, the photo first that seems to be taken from farther away.
     """
     ranked = []
-    for pair, ties in _common(seen, len(photos), len(control.ids)):
+    for pair, ties in _common(points, len(photos), len(control.ids)):
         one, second = pair
         picked = control.of(one, second)
         enough = all(
@@ -194,11 +194,11 @@ def _promising(
 
 
 def _common(
-    seen: SharedPoints, photos: int, first: int
+    points: SharedPoints, photos: int, first: int
 ) -> Iterator[tuple[tuple[int, int], tuple[FloatArray, FloatArray]]]:
     """Yield all two photos with the ties that both show, if these are no chance."""
-    pixels = np.full((photos, seen.count, 2), np.nan)
-    pixels[seen.photo, seen.point] = seen.pixels
+    pixels = np.full((photos, points.count, 2), np.nan)
+    pixels[points.photo, points.point] = points.pixels
     pixels = pixels[:, first:]
     for one, second in combinations(range(photos), 2):
         both = np.isfinite(pixels[one] + pixels[second]).all(axis=1)
@@ -238,12 +238,12 @@ def promise_of(first: Interior, second: Interior, x1: FloatArray, x2: FloatArray
 def _lenses(interiors: Sequence[Interior]) -> tuple[int, ...]:
     """Return, of each photo, the first of the same lens, of which no file tells more."""
 
-    def same(one: Interior, other: Interior) -> bool:
-        if one.is_assumed or one.is_calibrated or other.is_calibrated:
+    def same(first: Interior, second: Interior) -> bool:
+        if first.is_assumed or first.is_calibrated or second.is_calibrated:
             return False
-        if one.image_size != other.image_size:
+        if first.image_size != second.image_size:
             return False
-        return bool(abs(np.log(one.focal / other.focal)) < SAME_FOCAL)
+        return bool(abs(np.log(first.focal / second.focal)) < SAME_FOCAL)
 
     return tuple(
         next((j for j in range(k) if same(interiors[j], interior)), k)

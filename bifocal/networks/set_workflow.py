@@ -109,18 +109,18 @@ def align_photo_set(
     return replace(alignment, photos=photo_set)
 
 
-def set_as_dict(made: SetAlignment) -> dict[str, Any]:
+def set_as_dict(alignment: SetAlignment) -> dict[str, Any]:
     """Return the alignment of a set as plain data for ``--json``."""
     return {
-        "way": made.way,
+        "way": alignment.way,
         "photos": [
             {"name": photo.name, "distance": photo.distance, "nadir": photo.nadir, **spread}
             for photo, spread in zip(
-                made.photos.photos, made.setup["standard_deviations"], strict=True
+                alignment.photos.photos, alignment.setup["standard_deviations"], strict=True
             )
         ],
-        **{key: made.setup[key] for key in ("common_points", "sigma0", "control", "assumed")},
-        "lengths": made.setup.get("length_checks", []),
-        "words": made.words,
-        "remarks": made.remarks,
+        **{key: alignment.setup[key] for key in ("common_points", "sigma0", "control", "assumed")},
+        "lengths": alignment.setup.get("length_checks", []),
+        "words": alignment.words,
+        "remarks": alignment.remarks,
     }

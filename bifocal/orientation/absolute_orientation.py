@@ -88,58 +88,58 @@ def orient_pair(
     return replace(pair, frame=pair.frame or control.frame)
 
 
-def _oriented(given: Given) -> OrientedPair:
+def _oriented(inputs: Given) -> OrientedPair:
     """Return the cameras of a pair; what was mended or exchanged comes here again."""
-    site = given.site
-    lacking = validation.unknown_lenses(given.interiors, given.names)
-    if given.media:
+    site = inputs.site
+    lacking = validation.unknown_lenses(inputs.interiors, inputs.names)
+    if inputs.media:
         try:
-            return _through_media(given, lacking)
+            return _through_media(inputs, lacking)
         except GeometryError as error:
             raise _with_lacking(error, lacking) from error
-    interiors, one_lens = with_one_lens(given.interiors)
-    given = given.with_interiors(interiors)
-    enough = given.enough
+    interiors, one_lens = with_one_lens(inputs.interiors)
+    inputs = inputs.with_interiors(interiors)
+    enough = inputs.enough
     if lacking and not enough and None in site.distances:
         raise GeometryError(remark("refused.focal_or_distances", lacking=lacking))
-    ties, remarks = ties_of(given, needed=not enough)
-    if enough and not given.settled:
-        right = _typed_right(given, lambda one: _by_control(one, ties), by_control=True)
+    ties, remarks = ties_of(inputs, needed=not enough)
+    if enough and not inputs.settled:
+        right = _typed_right(inputs, lambda one: _by_control(one, ties), by_control=True)
         if right is not None:
             return right
-        given = replace(given, settled=True)
+        inputs = replace(inputs, settled=True)
     repeated: Repetition | None = None
     if ties is not None and not enough:
-        ties, repeated = laid_together(given, ties)
-        order = order_of(given, ties)
+        ties, repeated = laid_together(inputs, ties)
+        order = order_of(inputs, ties)
         if order < -ORDER.sure:
-            return _with_photos_exchanged(given, typed_stay=True)
-        remarks = (*remarks, *order_remarks(order, given.names))
-    cameras, agree, interiors = approximate_cameras(given, ties, enough)
+            return _with_photos_exchanged(inputs, typed_stay=True)
+        remarks = (*remarks, *order_remarks(order, inputs.names))
+    cameras, agree, interiors = approximate_cameras(inputs, ties, enough)
     if enough and ties is not None:
         check_picks(cameras, ties, interiors)
     if cameras[0].centre[2] < cameras[1].centre[2]:
-        return _with_photos_exchanged(given)
+        return _with_photos_exchanged(inputs)
     if site.far_first is not site:
         d1, d2 = site.distances
-        note = remark("orientation.distances_exchanged", d1=d1, d2=d2, name=given.names[0])
-        return _told(replace(given, site=site.far_first), note)
+        note = remark("orientation.distances_exchanged", d1=d1, d2=d2, name=inputs.names[0])
+        return _told(replace(inputs, site=site.far_first), note)
     if enough:
         validation.check_units(cameras, site, lenses_known=not lacking)
     elif ties is not None:
-        flat = validation.is_flat(ties, interiors, given.names, flat_is_fine=site.parallel)
+        flat = validation.is_flat(ties, interiors, inputs.names, flat_is_fine=site.parallel)
         # What stands out shows how the cameras stood; a flat wall does not.
-        given = replace(given, site=replace(site, parallel=flat))
-    observations = observations_of(given, interiors, ties, agree)
+        inputs = replace(inputs, site=replace(site, parallel=flat))
+    observations = observations_of(inputs, interiors, ties, agree)
     if one_lens:
         observations = replace(observations, sigma_zoom=STAGES.one_lens)
     start = PairUnknowns(cameras=cameras)
     if ties is not None:
         start = replace(start, radial=np.array([[ties.radial, 0.0]] * 2))
     try:
-        pair = oriented_in_stages(observations, start, given.photos, site, with_control=enough)
+        pair = oriented_in_stages(observations, start, inputs.photos, site, with_control=enough)
     except (GeometryError, ConvergenceError) as error:
-        right = _mended_by_ties(given, ties, observations)
+        right = _mended_by_ties(inputs, ties, observations)
         if right is not None:
             return right
         # Photos through glass or water may fit no cameras at all: then that is the reason.
@@ -147,12 +147,12 @@ def _oriented(given: Given) -> OrientedPair:
     pair = _without_gross(replace(pair, shape=_bend(pair.observations, pair.adjusted)))
     pair = weighed_by_control(pair) if enough else pair
     wrong = int((~pair.observations.pick_used).sum())
-    if ties is None and remarks and wrong > CONTROL.of_another_wall * len(given.control.ids):
-        first, second = given.names
+    if ties is None and remarks and wrong > CONTROL.of_another_wall * len(inputs.control.ids):
+        first, second = inputs.names
         about = {"first": first, "second": second, "count": wrong}
         raise GeometryError(remark("refused.another_wall", why=remarks[0], **about))
-    if model_remarks(pair, given.site) or pair.lines_off:
-        right = _mended_by_ties(given, ties, pair.observations)
+    if model_remarks(pair, inputs.site) or pair.lines_off:
+        right = _mended_by_ties(inputs, ties, pair.observations)
         if right is not None:
             return right
     certain = pair.shape.px - CERTAIN * pair.shape.sigma > BEND.strongly_curved
@@ -161,29 +161,29 @@ def _oriented(given: Given) -> OrientedPair:
         raise GeometryError(bent)  # what holds a bent wall by small chances only is none
     if repeated is not None:
         pair = repeated_in_words(pair, repeated)
-    return _with_words(pair, given, remarks)
+    return _with_words(pair, inputs, remarks)
 
 
-def _through_media(given: Given, lacking: str) -> OrientedPair:
+def _through_media(inputs: Given, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from control and common points.
 
     Common points say that their bent rays meet; the plane is that of the control points.
     """
-    if given.control.positioned.any() and not given.enough:
+    if inputs.control.positioned.any() and not inputs.enough:
         raise GeometryError(remark("refused.through_media"))
-    if not given.enough:
-        return _by_refracted_ties(given, lacking)
-    cameras, agree, interiors = approximate_cameras(given, None, True)
+    if not inputs.enough:
+        return _by_refracted_ties(inputs, lacking)
+    cameras, agree, interiors = approximate_cameras(inputs, None, True)
     if cameras[0].centre[2] < cameras[1].centre[2]:
-        return _with_photos_exchanged(given)
-    validation.check_units(cameras, given.site)
-    observations = observations_of(given, interiors, None, agree)
-    start = PairUnknowns(cameras=cameras, media=given.media)
-    pair = control_alone(observations, start, named=given.site.wall is not None)
+        return _with_photos_exchanged(inputs)
+    validation.check_units(cameras, inputs.site)
+    observations = observations_of(inputs, interiors, None, agree)
+    start = PairUnknowns(cameras=cameras, media=inputs.media)
+    pair = control_alone(observations, start, named=inputs.site.wall is not None)
     shares = [pair.adjusted.sigma("Z", n) / pair.adjusted.cameras[n - 1].centre[2] for n in (1, 2)]
     if lacking and max(shares) > CONTROL.hopeless:
         raise GeometryError(remark("refused.control_alone", lacking=lacking))
-    ties, remarks = ties_of(given, needed=False)
+    ties, remarks = ties_of(inputs, needed=False)
     note = remark("orientation.assumed_media_control")
     if ties is not None:
         pair, note = with_refracted_ties(pair, ties), remark("orientation.assumed_media")
@@ -191,56 +191,56 @@ def _through_media(given: Given, lacking: str) -> OrientedPair:
         bend = shape_between(pair.adjusted, ties.seen1, ties.seen2, every, size)
         pair = replace(pair, shape=bend)
     pair = _without_gross(replace(pair, assumed=(*pair.assumed, note)))
-    refuse_impossible_media(pair.adjusted, given.media)
+    refuse_impossible_media(pair.adjusted, inputs.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
-    return _with_words(pair, given, remarks)
+    return _with_words(pair, inputs, remarks)
 
 
-def _by_refracted_ties(given: Given, lacking: str) -> OrientedPair:
+def _by_refracted_ties(inputs: Given, lacking: str) -> OrientedPair:
     """Return the cameras of a pair that looks through media, from its common points alone."""
     if lacking:
         raise GeometryError(remark("refused.focal_through_media", lacking=lacking))
-    if given.media.leaning:
+    if inputs.media.leaning:
         raise GeometryError(remark("refused.port_through_media"))
-    start, ties = refracted_start(given, features_of(given))
+    start, ties = refracted_start(inputs, features_of(inputs))
     if start.cameras[0].centre[2] < start.cameras[1].centre[2]:
-        return _with_photos_exchanged(given)
-    air, *_, water = given.media.layers.indices
+        return _with_photos_exchanged(inputs)
+    air, *_, water = inputs.media.layers.indices
     freed = replace(ties, tolerance=ties.tolerance * air / water)  # pixels as small as in water
-    validation.is_flat(freed, given.interiors, given.names, flat_is_fine=False)
-    given = replace(given, site=replace(given.site, parallel=False))
-    picks = np.ones(len(given.control.ids), dtype=bool)
-    first, second = (replace(i, sigma_radial=0.0) for i in given.interiors)
-    observations = observations_of(given, (first, second), ties, picks)
-    pair = oriented_in_stages(observations, start, given.photos, given.site, with_control=False)
-    rivals = rivals_in_words(pair.faces, given.site)
-    if rivals and given.media.depth is not None:
+    validation.is_flat(freed, inputs.interiors, inputs.names, flat_is_fine=False)
+    inputs = replace(inputs, site=replace(inputs.site, parallel=False))
+    picks = np.ones(len(inputs.control.ids), dtype=bool)
+    first, second = (replace(i, sigma_radial=0.0) for i in inputs.interiors)
+    observations = observations_of(inputs, (first, second), ties, picks)
+    pair = oriented_in_stages(observations, start, inputs.photos, inputs.site, with_control=False)
+    rivals = rivals_in_words(pair.faces, inputs.site)
+    if rivals and inputs.media.depth is not None:
         raise GeometryError(remark("refused.depth_of_wall", rivals=rivals))
-    refuse_impossible_media(pair.adjusted, given.media)
+    refuse_impossible_media(pair.adjusted, inputs.media)
     check_room(pair.adjusted.media, pair.adjusted.cameras)
     ties1, ties2 = pair.observations.straight_ties(pair.adjusted.radial)
     bend = shape_between(
-        pair.adjusted, ties1, ties2, pair.observations.tie_used, given.interiors[0].image_size
+        pair.adjusted, ties1, ties2, pair.observations.tie_used, inputs.interiors[0].image_size
     )
-    return _with_words(replace(pair, shape=bend), given, ())
+    return _with_words(replace(pair, shape=bend), inputs, ())
 
 
-def _with_words(pair: OrientedPair, given: Given, remarks: tuple[str, ...]) -> OrientedPair:
+def _with_words(pair: OrientedPair, inputs: Given, remarks: tuple[str, ...]) -> OrientedPair:
     """Return the pair with all that is to be told of it, doubts first; refuse what is none."""
     validation.check_determined(pair.adjusted)
     validation.check_movement(pair.adjusted)
     sentences = (
-        *model_remarks(pair, given.site),
-        *filter(None, [given.pick_verdict.words, *(i.doubt for i in given.interiors)]),
+        *model_remarks(pair, inputs.site),
+        *filter(None, [inputs.pick_verdict.words, *(i.doubt for i in inputs.interiors)]),
         *remarks,
         *pair.remarks,
         *tilt_remarks(pair),
         *wall_remarks(pair),
-        *media_remarks(pair.adjusted, given.media),
-        *control_remarks(given.control, pair),
+        *media_remarks(pair.adjusted, inputs.media),
+        *control_remarks(inputs.control, pair),
         *distance_remarks(pair),
     )
-    assumed = (*pair.assumed, *assumptions(pair.observations, given.site))
+    assumed = (*pair.assumed, *assumptions(pair.observations, inputs.site))
     return replace(pair, remarks=sentences, assumed=assumed)
 
 
@@ -268,11 +268,13 @@ def _with_lacking(error: PhotogrammetryError, lacking: str) -> PhotogrammetryErr
     return GeometryError(remark("refused.likely_reason", error=error, reason=lacking))
 
 
-def _mended_by_ties(given: Given, ties: Ties | None, seen: PairObservations) -> OrientedPair | None:
+def _mended_by_ties(
+    inputs: Given, ties: Ties | None, observations: PairObservations
+) -> OrientedPair | None:
     """Return the pair with the slip mended that common points show; None without one."""
-    if ties is None or given.settled:
+    if ties is None or inputs.settled:
         return None
-    return _typed_right(given, lambda one: _by_ties(one, ties, seen), by_control=False)
+    return _typed_right(inputs, lambda one: _by_ties(one, ties, observations), by_control=False)
 
 
 def _without_gross(pair: OrientedPair) -> OrientedPair:
@@ -302,7 +304,7 @@ def _without_gross(pair: OrientedPair) -> OrientedPair:
 
 
 def _typed_right(
-    given: Given, fitted: Callable[[Given], TrialOrientation | None], *, by_control: bool
+    inputs: Given, fitted: Callable[[Given], TrialOrientation | None], *, by_control: bool
 ) -> OrientedPair | None:
     """Return the pair with the slip mended that explains a misfit, saying so; None without one.
 
@@ -313,11 +315,11 @@ def _typed_right(
     """
 
     def meant(typed: TypedOrientation) -> Given:
-        lens = given.with_interiors(typed.interiors)
+        lens = inputs.with_interiors(typed.interiors)
         lens = lens.turned if typed.exchanged else lens
         return replace(lens, control=typed.control, site=typed.site)
 
-    typed = TypedOrientation(interiors=given.interiors, control=given.control, site=given.site)
+    typed = TypedOrientation(interiors=inputs.interiors, control=inputs.control, site=inputs.site)
     slip = slip_of(typed, lambda one: fitted(meant(one)), by_control=by_control)
     if slip is not None and not slip.mended:
         raise GeometryError(slip.words)
@@ -328,56 +330,58 @@ def _typed_right(
     return replace(pair, exchanged=exchanged, frame=slip.meant.control.frame)
 
 
-def _told(given: Given, note: str) -> OrientedPair:
+def _told(inputs: Given, note: str) -> OrientedPair:
     """Return the pair of what is given instead of what was typed, saying so."""
-    pair = _oriented(given)
+    pair = _oriented(inputs)
     return replace(pair, remarks=(note, *pair.remarks))
 
 
-def _by_control(given: Given, ties: Ties | None) -> TrialOrientation | None:
+def _by_control(inputs: Given, ties: Ties | None) -> TrialOrientation | None:
     """Return how well control points, lenses, tapes and common points fit each other.
 
     Whichever photo is the far one, the longer distance is its. Control points leave the lines of
     common points uncertain by some pixels.
     """
-    d1, d2 = given.site.distance1, given.site.distance2
+    d1, d2 = inputs.site.distance1, inputs.site.distance2
     try:
-        cameras, agree, interiors = approximate_cameras(given, None, True)
+        cameras, agree, interiors = approximate_cameras(inputs, None, True)
         z1, z2 = (float(camera.centre[2]) for camera in cameras)
         if d1 and d2 and (d1 < d2) != (z1 < z2):
             d1, d2 = d2, d1
         if any(taped and not 0.5 < taped / z < 2 for taped, z in ((d1, z1), (d2, z2))):
             d1 = d2 = None  # another unit: `validation.check_units` says so
-        given = replace(given, site=replace(given.site, distance1=d1, distance2=d2))
-        observations = observations_of(given, interiors, None, agree)
+        inputs = replace(inputs, site=replace(inputs.site, distance1=d1, distance2=d2))
+        observations = observations_of(inputs, interiors, None, agree)
         pair = control_alone(observations, PairUnknowns(cameras=cameras), named=False)
         pair = _without_gross(pair)
     except (GeometryError, ConvergenceError):
         return None
     adjusted, used = pair.adjusted, pair.observations.pick_used
-    test = np.minimum(adjusted.control_test[given.control.positioned], SLIPS.most)
+    test = np.minimum(adjusted.control_test[inputs.control.positioned], SLIPS.most)
     square = float((test**2).mean()) + _pulled(pair) / (4 * len(test))
     if ties is not None:
-        cameras = adjusted.cameras[::-1] if given.exchanged else adjusted.cameras
+        cameras = adjusted.cameras[::-1] if inputs.exchanged else adjusted.cameras
         off = contradiction((cameras[0], cameras[1]), ties) / (2 * ties.tolerance)
         square += max(off - 1.0, 0.0) ** 2
-    if given.pick_verdict.slip is not None:
+    if inputs.pick_verdict.slip is not None:
         square += SLIPS.most**2
     return TrialOrientation(misfit=float(np.sqrt(square)), cameras=adjusted.cameras, lost=~used)
 
 
-def _by_ties(given: Given, ties: Ties, seen: PairObservations) -> TrialOrientation | None:
+def _by_ties(inputs: Given, ties: Ties, observations: PairObservations) -> TrialOrientation | None:
     """Return how well common points as matched meet, as a share of what they may miss by.
 
     With how far the façade's lines come out of the wall.
     """
-    (far, first), (near, second) = ((p.grey, replace(p, grey=None)) for p in given.photos)
+    (far, first), (near, second) = ((p.grey, replace(p, grey=None)) for p in inputs.photos)
     try:
-        cameras, _, interiors = approximate_cameras(given, ties, False)
-        tilt = seen.sigma_tilt if given.site.parallel else None
-        seen = replace(seen, interiors=interiors, lines=(), sigma_tilt=tilt)
+        cameras, _, interiors = approximate_cameras(inputs, ties, False)
+        tilt = observations.sigma_tilt if inputs.site.parallel else None
+        observations = replace(observations, interiors=interiors, lines=(), sigma_tilt=tilt)
         start = PairUnknowns(cameras=cameras)
-        pair = oriented_in_stages(seen, start, (first, second), given.site, with_control=False)
+        pair = oriented_in_stages(
+            observations, start, (first, second), inputs.site, with_control=False
+        )
     except (GeometryError, ConvergenceError):
         return None
     fine = REMARKS.worst_fit / 3 * max(interiors[0].image_size) / 3000
@@ -404,20 +408,20 @@ def _pulled(pair: OrientedPair) -> float:
     return float(np.sum(np.square(changes)))
 
 
-def _with_photos_exchanged(given: Given, *, typed_stay: bool = False) -> OrientedPair:
+def _with_photos_exchanged(inputs: Given, *, typed_stay: bool = False) -> OrientedPair:
     """Return the pair with the photos the other way round, saying so.
 
     What was typed for the far photo goes with its file, or stays with the far one.
     """
-    (near, far), site = given.names, given.site
+    (near, far), site = inputs.names, inputs.site
     if site.wall is not None:
         raise GeometryError(remark("align.spot_of_near", near=near, far=far))
     its = 1 if site.far_first is site else 2
-    site, media = site.far_first, given.media.exchanged()
-    turned = replace(given, photos=given.photos[::-1])
+    site, media = site.far_first, inputs.media.exchanged()
+    turned = replace(inputs, photos=inputs.photos[::-1])
     if typed_stay:
-        turned, site = turned.with_interiors(given.interiors), replace(site, ordered=True)
-    control = given.control.exchanged()
+        turned, site = turned.with_interiors(inputs.interiors), replace(site, ordered=True)
+    control = inputs.control.exchanged()
     pair = _oriented(replace(turned, control=control, site=site, media=media))
     key = f"orientation.photos_exchanged{'_typed' if typed_stay else ''}"
     note = remark(key, near=near, far=far, number=its)

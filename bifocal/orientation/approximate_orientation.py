@@ -101,22 +101,22 @@ class Given:
         )
 
 
-def order_of(given: Given, ties: Ties) -> float:
+def order_of(inputs: Given, ties: Ties) -> float:
     """Return by how many standard deviations the first photo is the far one.
 
     Focal lengths and distances that were typed tell nothing of the photos' order, unless the scale
     on the wall fits them in one order only, or both lenses are alike; unknown lenses neither.
     """
-    first, second = given.interiors
+    first, second = inputs.interiors
     assumed = first.is_assumed or second.is_assumed
     alike = first.image_size == second.image_size and first.focal != second.focal
     silent = assumed or (alike and (first.is_typed or second.is_typed))
-    far, near = (photo.grey for photo in given.photos)
-    if given.site.ordered or not silent or far is None or near is None:
+    far, near = (photo.grey for photo in inputs.photos)
+    if inputs.site.ordered or not silent or far is None or near is None:
         return np.inf
     # Logarithms of the distances' ratio by lenses and scale in either order, against the taped one.
     ratio, scale = first.focal / second.focal, plane_scale(ties, first.image_size)
-    d1, d2 = given.site.distances
+    d1, d2 = inputs.site.distances
     taped = abs(np.log(d1 / d2)) if d1 and d2 else 0.0
     either = (np.log([ratio * scale, ratio / scale]) - taped).tolist()
     if not (d1 and d2):  # the far camera is any farther
@@ -138,68 +138,68 @@ def check_picks(cameras: Cameras, ties: Ties, interiors: Interiors) -> None:
         raise GeometryError(remark("align.picks_misfit"))
 
 
-def features_of(given: Given) -> tuple[Features, Features]:
+def features_of(inputs: Given) -> tuple[Features, Features]:
     """Return the features of both photos, refusing photos that are missing, blurred or the same."""
-    far, near = given.photos[0].grey, given.photos[1].grey
+    far, near = inputs.photos[0].grey, inputs.photos[1].grey
     if far is None or near is None:
         raise GeometryError(remark("refused.through_media"))
-    for name, image in zip(given.names, (far, near), strict=True):
+    for name, image in zip(inputs.names, (far, near), strict=True):
         validation.check_sharp(name, image)
-    validation.check_different(*given.names, (far, near))
-    first, second = (photo.features for photo in given.photos)
+    validation.check_different(*inputs.names, (far, near))
+    first, second = (photo.features for photo in inputs.photos)
     return first or find_features(far), second or find_features(near)
 
 
-def ties_of(given: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
+def ties_of(inputs: Given, *, needed: bool) -> tuple[Ties | None, tuple[str, ...]]:
     """Return the photos' common points and remarks; none only if control points suffice."""
-    if any(photo.grey is None for photo in given.photos):
+    if any(photo.grey is None for photo in inputs.photos):
         return None, ()
     try:
-        return find_ties(*features_of(given), given.interiors, given.names), ()
+        return find_ties(*features_of(inputs), inputs.interiors, inputs.names), ()
     except GeometryError as error:
         if needed or isinstance(error, validation.SamePhotoError):
             raise
         return None, (remark("orientation.control_alone", why=error),)
 
 
-def laid_together(given: Given, ties: Ties) -> tuple[Ties, Repetition | None]:
+def laid_together(inputs: Given, ties: Ties) -> tuple[Ties, Repetition | None]:
     """Return common points where the photos belong together, if the wall repeats itself."""
-    far, near = (photo.grey for photo in given.photos)
+    far, near = (photo.grey for photo in inputs.photos)
     if far is None or near is None:
         return ties, None
     with suppress(GeometryError):
-        cameras, _, interiors = approximate_cameras(given, ties, False)
+        cameras, _, interiors = approximate_cameras(inputs, ties, False)
         repeated = repetition((far, near), interiors, cameras[0], ties)
         if repeated is not None:
             around = repeated.surrounding
-            ties = find_ties(*features_of(given), given.interiors, given.names, around)
+            ties = find_ties(*features_of(inputs), inputs.interiors, inputs.names, around)
         return ties, repeated
     return ties, None
 
 
 def approximate_cameras(
-    given: Given, ties: Ties | None, enough: bool
+    inputs: Given, ties: Ties | None, enough: bool
 ) -> tuple[Cameras, BoolArray, Interiors]:
     """Return approximate cameras, the control points that agree, and the interiors used."""
-    control, interiors = given.control, given.interiors
+    control, interiors = inputs.control, inputs.interiors
     agree = np.ones(len(control.ids), dtype=bool)
     if enough:
         cameras = []
-        picks = zip((control.pixels1, control.pixels2), given.photos, strict=True)
+        picks = zip((control.pixels1, control.pixels2), inputs.photos, strict=True)
         for number, (pixels, photo) in enumerate(picks):
             picked = control.positioned & np.isfinite(pixels).all(axis=1)
             xyz, ideal = np.nan_to_num(control.xyz[picked]), photo.interior.ideal(pixels[picked])
             with located(photo.name):
-                camera, fits = resect(xyz, ideal, photo.interior, given.media, number)
+                camera, fits = resect(xyz, ideal, photo.interior, inputs.media, number)
             cameras.append(camera)
             agree[np.flatnonzero(picked)[~fits]] = False
         return (cameras[0], cameras[1]), agree, interiors
     if ties is None:
         raise GeometryError("too few control points, and no common points to go with them.")
-    interiors = plausible_focals(interiors, ties, given.site)
+    interiors = plausible_focals(interiors, ties, inputs.site)
     if all(interior.is_sought for interior in interiors):
         interiors = sought_focal(ties, interiors)
-    return scaled(first_cameras(ties, interiors), given, interiors), agree, interiors
+    return scaled(first_cameras(ties, interiors), inputs, interiors), agree, interiors
 
 
 def plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> Interiors:
@@ -217,9 +217,9 @@ def plausible_focals(interiors: Interiors, ties: Ties, site: SiteMeasures) -> In
     return replace(first, focal=second.focal / ratio), second
 
 
-def scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
+def scaled(cameras: Cameras, inputs: Given, interiors: Interiors) -> Cameras:
     """Return cameras of far distance 1 brought to metres and, where known, to X and Y."""
-    control, site = given.control, given.site
+    control, site = inputs.control, inputs.site
     near, scale = cameras[1].centre[2], 0.0
     positions = ray_on_plane(cameras[0], interiors[0].ideal(control.pixels1))
     points = np.flatnonzero(control.positioned & np.isfinite(positions).all(axis=1))
@@ -251,10 +251,10 @@ def scaled(cameras: Cameras, given: Given, interiors: Interiors) -> Cameras:
 
 
 def observations_of(
-    given: Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
+    inputs: Given, interiors: Interiors, ties: Ties | None, agree: BoolArray
 ) -> PairObservations:
     """Return everything observed, ideal pixels throughout."""
-    control, site = given.control, given.site
+    control, site = inputs.control, inputs.site
     pixels1, pixels2 = interiors[0].ideal(control.pixels1), interiors[1].ideal(control.pixels2)
     measured = {
         name: (value, site.sigma)
@@ -270,7 +270,7 @@ def observations_of(
         sigma_tilt=SIGMA_PARALLEL if site.parallel else None,
         free_datum=control.positioned.sum() < 2,
         sigma_body=_same_body(interiors),
-        media=given.media,
+        media=inputs.media,
     )
     return base if ties is None else with_ties(base, ties)
 

@@ -311,11 +311,11 @@ def read_control(
     return replace(control, remarks=tuple(remarks))
 
 
-def _places(columns: str | None, wanted: Sequence[Column]) -> dict[str, str] | None:
+def _places(columns: str | None, headings: Sequence[Column]) -> dict[str, str] | None:
     """Return which column is which, as a user says; E and N are understood as X and Y."""
     if not columns:
         return None
-    places = parse_column_map(columns, [*(column.key for column in wanted), "E", "N"])
+    places = parse_column_map(columns, [*(column.key for column in headings), "E", "N"])
     return {{"E": "X", "N": "Y"}.get(key, key): place for key, place in places.items()}
 
 

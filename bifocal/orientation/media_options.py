@@ -15,7 +15,7 @@ from photocore.errors import InputError
 from photocore.options import options_of
 
 
-def media_of(given: Mapping[str, Any]) -> PairMedia:
+def media_of(options: Mapping[str, Any]) -> PairMedia:
     """Return media as options name them (``indices``, ``thicknesses``, ``port`` ...); none in air.
 
     Raises
@@ -23,19 +23,19 @@ def media_of(given: Mapping[str, Any]) -> PairMedia:
     InputError
         If they do not describe media.
     """
-    if given.get("indices") is None:
+    if options.get("indices") is None:
         media = options_of(PairMediaOptions).values()
-        lost = [option for option in media if given.get(option.name) not in (None, ())]
+        lost = [option for option in media if options.get(option.name) not in (None, ())]
         if lost:
             raise InputError(remark("media.without_indices", flag=lost[0].flag))
         return PairMedia.none()
     ports, normals = (
-        (_own(given, name, 1), _own(given, name, 2)) for name in ("port", "port_normal")
+        (_own(options, name, 1), _own(options, name, 2)) for name in ("port", "port_normal")
     )
     return PairMedia.stated(
-        given["indices"], given.get("thicknesses") or (), ports=ports, depth=given.get("depth"),
-        normals=(_normal(normals[0]), _normal(normals[1])), estimate=given.get("estimate") or (),
-        priors=dict(_prior(text) for text in given.get("prior") or ()),
+        options["indices"], options.get("thicknesses") or (), ports=ports,
+        depth=options.get("depth"), normals=(_normal(normals[0]), _normal(normals[1])), estimate=options.get("estimate") or (),
+        priors=dict(_prior(text) for text in options.get("prior") or ()),
     )  # fmt: skip
 
 
@@ -45,10 +45,10 @@ def _prior(text: str) -> tuple[str, float]:
     return name, float(np.radians(sigma)) if name in LEANS else sigma
 
 
-def _own(given: Mapping[str, Any], name: str, number: int) -> Any:
+def _own(options: Mapping[str, Any], name: str, number: int) -> Any:
     """Return an option of one camera, or else that of both."""
-    of_photo = given.get(f"{name}{number}")
-    return given.get(name) if of_photo is None else of_photo
+    of_photo = options.get(f"{name}{number}")
+    return options.get(name) if of_photo is None else of_photo
 
 
 def _normal(stated: tuple[float, ...] | str | None) -> Normal:

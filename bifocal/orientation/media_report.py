@@ -19,7 +19,7 @@ from photocore.adjustment.priors import (
 from photocore.errors import GeometryError
 
 
-def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
+def media_in_words(adjusted: AdjustedPair, stated: PairMedia) -> tuple[str, ...]:
     """Return what lies between cameras and wall, and what of it was estimated, in sentences."""
     media = adjusted.media
     if not media:
@@ -33,29 +33,29 @@ def media_in_words(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
     words = [remark(key, layers=layers, **about)]
     for row, name in _estimated(adjusted, media):
         sigma = float(np.sqrt(adjusted.of_unknowns[row, row]))
-        numbers = {"value": media.value(name), "sigma": sigma, "start": given.value(name)}
-        numbers |= {"prior": given.sigmas[name]}
+        numbers = {"value": media.value(name), "sigma": sigma, "start": stated.value(name)}
+        numbers |= {"prior": stated.sigmas[name]}
         shown = {what: _shown(name, number) for what, number in numbers.items()}
         words.append(remark("orientation.media_found", name=name, **shown))
     return tuple(words)
 
 
-def media_remarks(adjusted: AdjustedPair, given: PairMedia) -> tuple[str, ...]:
+def media_remarks(adjusted: AdjustedPair, stated: PairMedia) -> tuple[str, ...]:
     """Return which unknowns of the media the data do not carry, or cannot tell from others."""
     media = adjusted.media
     remarks = []
     factor = max(adjusted.sigma0, 1.0)
     for row, name in _estimated(adjusted, media):
-        prior, sigma = given.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
+        prior, sigma = stated.sigmas[name], float(np.sqrt(adjusted.of_unknowns[row, row]))
         if sigma > UNCARRIED * prior * factor:
-            remarks.append(_hardly_carried(name, given.value(name), prior))
+            remarks.append(_hardly_carried(name, stated.value(name), prior))
         if (twin := _twin(adjusted, media, row)) and twin[1] > ALIKE:
             about = {"name": name, "twin": twin[0], "correlation": twin[1]}
             remarks.append(remark("orientation.hardly_told_apart", **about))
     return tuple(remarks)
 
 
-def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
+def refuse_impossible_media(adjusted: AdjustedPair, stated: PairMedia) -> None:
     """Refuse indices and lengths that the medium named cannot have.
 
     Raises
@@ -65,8 +65,8 @@ def refuse_impossible_media(adjusted: AdjustedPair, given: PairMedia) -> None:
     """
     media = adjusted.media
     for row, name in _estimated(adjusted, media):
-        start, value = given.value(name), media.value(name)
-        sigma = given.sigmas[name]
+        start, value = stated.value(name), media.value(name)
+        sigma = stated.sigmas[name]
         least, most = 1e-6 * start, np.inf
         if name.startswith("index"):
             least, most = LEAST_INDEX, MOST_INDEX

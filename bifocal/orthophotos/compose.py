@@ -379,15 +379,15 @@ def _closing_gaps(
 
 
 def _alike(
-    one: ImageArray, other: ImageArray, where: BoolArray, view: SourcePhoto, gsd: float
+    first: ImageArray, second: ImageArray, where: BoolArray, view: SourcePhoto, gsd: float
 ) -> bool:
     """Return whether two photos show one surface at some pixels, beyond noise and half a pixel."""
     if not where.any():
         return False
     blur = GAPS.blur * max(view.photo.gsd(view.size) / gsd, 1.0)
-    smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), blur) for image in (one, other)]
+    smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), blur) for image in (first, second)]
     away = np.abs(smooth[0] - smooth[1])[where]
-    return float(np.median(away)) < GAPS.differ * np.iinfo(one.dtype).max
+    return float(np.median(away)) < GAPS.differ * np.iinfo(first.dtype).max
 
 
 def _choose(

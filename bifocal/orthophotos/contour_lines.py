@@ -180,7 +180,7 @@ def _clear_parts(
 
 
 def _rises(
-    left: Float32Array, right: Float32Array, level: Float32Array, wanted: Float32Array,
+    left: Float32Array, right: Float32Array, level: Float32Array, target: Float32Array,
     stretch: float,
 ) -> BoolArray:  # fmt: skip
     """Return where the relief beside a line differs from side to side by more than is wanted."""
@@ -196,8 +196,8 @@ def _rises(
     up, down = averaged(left - level, level - right), averaged(level - right, left - level)
     way = np.sign(up + down)
     # A line at the foot of a step follows what the flat wall does at its own level.
-    either = np.minimum(up * way, down * way) > CONTOURS.either * wanted
-    return np.asarray((np.abs(up + down) > wanted) & either)
+    either = np.minimum(up * way, down * way) > CONTOURS.either * target
+    return np.asarray((np.abs(up + down) > target) & either)
 
 
 def _looked_up(field: Float32Array, places: FloatArray) -> Float32Array:

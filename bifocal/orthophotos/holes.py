@@ -99,14 +99,14 @@ def _copy_texture(
 
 
 def _best_copy(
-    around: ImageArray, known: BoolArray, colours: ImageArray, hole: BoolArray, rim: BoolArray
+    around: ImageArray, valid: BoolArray, colours: ImageArray, hole: BoolArray, rim: BoolArray
 ) -> Float32Array | None:
     """Return the part of the surroundings whose rim fits best; None if none is whole."""
     if around.shape[0] <= colours.shape[0] or around.shape[1] <= colours.shape[1]:
         return None
     grey = [part.mean(axis=2) if part.ndim == 3 else part for part in (around, colours)]
     wide, patch, weight, unknown, weights = (
-        np.asarray(part, np.float32) for part in (*grey, rim, ~known, hole)
+        np.asarray(part, np.float32) for part in (*grey, rim, ~valid, hole)
     )
     off = cv2.matchTemplate(wide, patch, cv2.TM_SQDIFF, mask=weight)
     empty = cv2.matchTemplate(unknown, weights, cv2.TM_CCORR)

@@ -143,11 +143,11 @@ def _likeness(
     return likenesses
 
 
-def _detail(image: Float32Array, seen: BoolArray) -> Float32Array:
+def _detail(image: Float32Array, visible: BoolArray) -> Float32Array:
     """Return the first band less its surroundings, from which light and tilt are gone."""
-    band = np.where(seen, np.nan_to_num(image[:, :, 0]), np.float32(0))
+    band = np.where(visible, np.nan_to_num(image[:, :, 0]), np.float32(0))
     side = (max(band.shape) // 12 | 1,) * 2
-    share = cv2.blur(seen.astype(np.float32), side)
+    share = cv2.blur(visible.astype(np.float32), side)
     return np.asarray(band - cv2.blur(band, side) / np.maximum(share, 1e-6), np.float32)
 
 
@@ -250,10 +250,12 @@ def window_of(layer: Layer, grid: Grid) -> Seen:
     return moved.reshape(*grid.shape, -1), inside > 0
 
 
-def _around(image: NDArray[Any], seen: BoolArray) -> NDArray[Any]:
+def _around(image: NDArray[Any], visible: BoolArray) -> NDArray[Any]:
     """Return the mean colour of what is seen within 3 px: cubic weights reach 2 px into holes."""
-    share = cv2.blur(seen.astype(np.float32), (7, 7))[:, :, None]
-    sums = np.atleast_3d(cv2.blur(np.where(seen[:, :, None], image, 0).astype(np.float32), (7, 7)))
+    share = cv2.blur(visible.astype(np.float32), (7, 7))[:, :, None]
+    sums = np.atleast_3d(
+        cv2.blur(np.where(visible[:, :, None], image, 0).astype(np.float32), (7, 7))
+    )
     return (sums.reshape(image.shape) / np.maximum(share, 1e-6)).astype(image.dtype)
 
 
@@ -274,10 +276,10 @@ def _onto(layer: Layer, coarse: Grid) -> tuple[Float32Array, BoolArray]:
     return moved.reshape(*coarse.shape, -1), inside > 0
 
 
-def _depth(seen: BoolArray) -> Float32Array:
+def _depth(visible: BoolArray) -> Float32Array:
     """Return how far a place is from the rim of a layer, holes within it not counted. [px]"""
     # A rim of zeros: the edge of the raster is an edge of the layer as well.
-    padded = np.pad(seen.astype(np.uint8), 1)
+    padded = np.pad(visible.astype(np.uint8), 1)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
     closed[[0, -1]], closed[:, [0, -1]] = 0, 0
     depth = cv2.distanceTransform(closed, cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -361,7 +363,7 @@ def _overlap(a: Grid, b: Grid) -> bool:
     return all(first[k] < second[k + 2] and second[k] < first[k + 2] for k in (0, 1))
 
 
-def _owners(plan: SeamPlan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
+def _owners(plan: SeamPlan, grid: Grid, visible: dict[int, BoolArray]) -> IntArray:
     """Return the layer of every pixel: the planned one, or the next that sees it."""
     coarse = plan.coarse
     column = np.rint((grid.columns_x - coarse.x0) / coarse.gsd).astype(int)
@@ -369,13 +371,13 @@ def _owners(plan: SeamPlan, grid: Grid, seen: dict[int, BoolArray]) -> IntArray:
     at = np.ix_(row.clip(0, coarse.height - 1), column.clip(0, coarse.width - 1))
     owner = plan.labels[at].copy()
     good = np.zeros(grid.shape, bool)
-    for k, valid in seen.items():
+    for k, valid in visible.items():
         good |= (owner == k) & valid
     if good.all():
         return owner
     order = np.full(grid.shape, -1.0, np.float32)
     next_best = np.full(grid.shape, -1, np.int64)
-    for k, valid in seen.items():
+    for k, valid in visible.items():
         better = valid & (plan.rank[k][at] > order)
         order = np.where(better, plan.rank[k][at], order)
         next_best[better] = k

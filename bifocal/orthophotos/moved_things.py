@@ -94,10 +94,10 @@ def moved_things(
             np.ascontiguousarray(_padded(of, (left, top, width, height)))
             for of in (first, second, (label == number).astype(np.uint8), measured, both)
         ]
-        one, other, blob, known, common = padded
+        one, other, blob, valid, common = padded
         rings, _ = cv2.findContours(blob, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         full = cv2.drawContours(np.zeros_like(blob), rings, -1, 1, cv2.FILLED)
-        if known[full > 0].mean() > MOVED.measured or _likeness(one, other, full) > MOVED.likeness:
+        if valid[full > 0].mean() > MOVED.measured or _likeness(one, other, full) > MOVED.likeness:
             continue
         share = _share_of_edges(one, other, full, common > 0)
         # Of the wall are the colours of the wall: what is stranger to it is the thing.
@@ -167,13 +167,13 @@ def _padded(image: NDArray[Any], box: tuple[int, int, int, int]) -> NDArray[Any]
     return out
 
 
-def _likeness(one: Float32Array, other: Float32Array, full: ByteArray) -> float:
+def _likeness(first: Float32Array, second: Float32Array, full: ByteArray) -> float:
     """Return the median correlation of blocks within a region with the best place beside them."""
     half, reach = MOVED.block // 2, MOVED.reach
-    one, other = (image.mean(axis=-1) for image in (one, other))
+    first, second = (image.mean(axis=-1) for image in (first, second))
     edge = half + reach
     sides = (edge,) * 4
-    wide, whole = (cv2.copyMakeBorder(i, *sides, cv2.BORDER_REPLICATE) for i in (one, other))
+    wide, whole = (cv2.copyMakeBorder(i, *sides, cv2.BORDER_REPLICATE) for i in (first, second))
     best = []
     step = max(half + 1, math.isqrt(int(full.sum()) // MOVED.blocks))
     for row, column in np.argwhere(full[::step, ::step]) * step:
@@ -189,14 +189,14 @@ def _likeness(one: Float32Array, other: Float32Array, full: ByteArray) -> float:
 
 
 def _share_of_edges(
-    one: Float32Array, other: Float32Array, full: ByteArray, common: BoolArray
+    first: Float32Array, second: Float32Array, full: ByteArray, common: BoolArray
 ) -> float:
     """Return how much of the difference's edges along a region's rim are photo 1's, 0 to 1."""
     square = np.ones((5, 5), np.uint8)
     rim = (cv2.dilate(full, square) > 0) & (cv2.erode(full, square) == 0) & common
     along = total = 0.0
     for axis in ((1, 0), (0, 1)):
-        of_first, of_difference = (cv2.Sobel(i, cv2.CV_32F, *axis) for i in (one, one - other))
+        of_first, of_difference = (cv2.Sobel(i, cv2.CV_32F, *axis) for i in (first, first - second))
         along += float((of_first * of_difference)[rim].sum())
         total += float((of_difference**2)[rim].sum())
     return float(np.clip(along / max(total, 1e-6), 0, 1))

@@ -139,12 +139,16 @@ class _Pdf:
         self.file.write(f"{table}{trailer}startxref\n{start}\n%%EOF\n".encode("ascii"))
 
 
-def _properties(made: Provenance) -> str:
+def _properties(origin: Provenance) -> str:
     """Return the entries that viewers show as properties of the file."""
-    metadata = {"Creator": made.program, "Producer": "bifocal", "Subject": "; ".join(made.lines())}
+    metadata = {
+        "Creator": origin.program,
+        "Producer": "bifocal",
+        "Subject": "; ".join(origin.lines()),
+    }
     texts = {key: f"\ufeff{text}".encode("utf-16-be").hex() for key, text in metadata.items()}
     entries = " ".join(f"/{key} <{text}>" for key, text in texts.items())
-    return f"<< {entries} /CreationDate (D:{made.date.replace('-', '')}000000Z) >>"
+    return f"<< {entries} /CreationDate (D:{origin.date.replace('-', '')}000000Z) >>"
 
 
 class _PdfCanvas:

@@ -13,14 +13,14 @@ from photocore.arrays import BoolArray, Float32Array
 
 
 def fill_holes(
-    image: NDArray[Any], known: BoolArray, holes: BoolArray
+    image: NDArray[Any], valid: BoolArray, holes: BoolArray
 ) -> tuple[NDArray[Any], BoolArray]:
     """Return the image with holes closed, and which of them were.
 
     Parameters
     ----------
     image : ndarray, shape (h, w) or (h, w, c)
-    known : ndarray of bool, shape (h, w)
+    valid : ndarray of bool, shape (h, w)
         Pixels that hold colours.
     holes : ndarray of bool, shape (h, w)
         Pixels to close; those too far from any known one stay as they are.
@@ -30,8 +30,8 @@ def fill_holes(
     Pull: known colours are averaged over 2 x 2 pixels again and again until averages reach into
     the holes. Push: each level takes its unknown pixels from the next coarser one.
     """
-    filled = _pushed(image, known, COLOURS.halvings)
-    done: BoolArray = holes & np.isfinite(filled.reshape(*known.shape, -1)).all(axis=-1)
+    filled = _pushed(image, valid, COLOURS.halvings)
+    done: BoolArray = holes & np.isfinite(filled.reshape(*valid.shape, -1)).all(axis=-1)
     out = image.copy()
     if image.dtype.kind == "f":
         out[done] = filled[done]
@@ -41,19 +41,19 @@ def fill_holes(
     return out, done
 
 
-def membrane(values: Float32Array, known: BoolArray) -> Float32Array:
+def membrane(values: Float32Array, valid: BoolArray) -> Float32Array:
     """Return a smooth sheet through known values, where each other is the mean of those around.
 
     Laplace's equation, relaxed at every level of the pyramid; the rim of the picture is free.
     """
-    return _pushed(values, known, 16, WHOLE.sweeps)
+    return _pushed(values, valid, 16, WHOLE.sweeps)
 
 
-def _pushed(image: NDArray[Any], known: BoolArray, halvings: int, sweeps: int = 0) -> Float32Array:
+def _pushed(image: NDArray[Any], valid: BoolArray, halvings: int, sweeps: int = 0) -> Float32Array:
     """Return the image with what is unknown from coarser levels, relaxed so many times at each."""
-    weight = known.astype(np.float32)
+    weight = valid.astype(np.float32)
     colour: NDArray[Any] = image.astype(np.float32)
-    colour[~known] = 0
+    colour[~valid] = 0
     levels = [(colour, weight)]
     for _ in range(halvings):
         if min(weight.shape) < 2:

@@ -426,17 +426,17 @@ def _followed_by_numpy(  # type: ignore[no-untyped-def]
         inside = (i >= 0) & (i < rows) & (j >= 0) & (j < columns)
         return relief[i.clip(0, rows - 1), j.clip(0, columns - 1)], inside
 
-    left = np.arange(len(row))
+    running = np.arange(len(row))
     for t_all in [*(np.full(len(row), t) for t in beside), *(to_occluder + t for t in shifts)]:
-        t, ray = t_all[left], slope[left]
-        above, inside = height(left, t)
-        over = above - r[left] - ray * t
+        t, ray = t_all[running], slope[running]
+        above, inside = height(running, t)
+        over = above - r[running] - ray * t
         perhaps = np.nonzero(inside & (t >= beside[0]) & (over > -rim * ray))[0]
         # The benefit of the doubt is a step's only: a slope just short of the ray's hides nothing.
-        below, _ = height(left[perhaps], t[perhaps] - 1)
+        below, _ = height(running[perhaps], t[perhaps] - 1)
         step = above[perhaps] - below > steep * ray[perhaps]
-        hidden[left[perhaps[step | (over[perhaps] > 0)]]] = True
-        left = left[~hidden[left]]
+        hidden[running[perhaps[step | (over[perhaps] > 0)]]] = True
+        running = running[~hidden[running]]
     return hidden
 
 

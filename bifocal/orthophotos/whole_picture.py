@@ -49,21 +49,21 @@ class CompletedSurface:
         self.surface = surface
         self._grid = _sheet_grid(surface, grid)
         relief = surface.window(self._grid)
-        known = np.isfinite(relief)
-        told = self.measured(self._grid)
-        kept = known
-        if told is not None and (known & ~told).any():
+        finite = np.isfinite(relief)
+        measured = self.measured(self._grid)
+        kept = finite
+        if measured is not None and (finite & ~measured).any():
             slope = _slope(photo, self._grid)
-            kept = _kept(relief, known & told, slope, WHOLE.bound * pixel, self._grid.gsd)
+            kept = _kept(relief, finite & measured, slope, WHOLE.bound * pixel, self._grid.gsd)
         self._share = np.ones(self._grid.shape, np.float32)
-        if known.any() and not kept.all():
+        if finite.any() and not kept.all():
             relief = membrane(relief, kept)
-            away = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
+            away = cv2.distanceTransform((~finite).astype(np.uint8), cv2.DIST_L2, 5)
             near = max(WHOLE.near * max(self._grid.shape), WHOLE.seam)
             far = max(WHOLE.far * max(self._grid.shape), 2 * near)
             self._share = np.clip((far - away) / (far - near), 0, 1).astype(np.float32)
             relief = relief * self._share
-        elif not known.any():
+        elif not finite.any():
             relief, self._share = np.zeros_like(relief), np.zeros_like(self._share)
         self._relief = np.ascontiguousarray(relief, np.float32)
         self._kept = kept
@@ -73,17 +73,17 @@ class CompletedSurface:
         """Return relief at the pixel centres of a grid, known everywhere. [m]"""
         exact = self.surface.window(grid)
         keep = np.isfinite(exact) & self._flags(self._kept, grid)
-        told = self.measured(grid)
-        if told is not None:
-            keep &= told
+        measured = self.measured(grid)
+        if measured is not None:
+            keep &= measured
         return exact if keep.all() else np.where(keep, exact, self._at(self._relief, grid))
 
     def measured(self, grid: Grid) -> BoolArray | None:
         """Return which pixels of a grid both photos measured, or were drawn."""
-        told = measured_on(self.surface, grid)
-        if told is not None and isinstance(self.surface, FacedSurface):
-            told = told | (self.surface.labels(grid) > 0)
-        return told
+        mask = measured_on(self.surface, grid)
+        if mask is not None and isinstance(self.surface, FacedSurface):
+            mask = mask | (self.surface.labels(grid) > 0)
+        return mask
 
     def extremes(self, bounds: Bounds) -> tuple[float, float]:
         """Return the extremes over a box."""
@@ -93,12 +93,12 @@ class CompletedSurface:
 
     def source(self, grid: Grid) -> ByteArray:
         """Return what relief stands on: `Source` INTERPOLATED, PLANE, or NONE where measured."""
-        known = self.measured(grid)
-        known = np.isfinite(self.surface.window(grid)) if known is None else known
-        known = known & self._flags(self._kept, grid)
+        measured = self.measured(grid)
+        measured = np.isfinite(self.surface.window(grid)) if measured is None else measured
+        measured = measured & self._flags(self._kept, grid)
         near = self._at(self._share, grid) >= 0.5
         mark = np.where(near, np.uint8(Source.INTERPOLATED), np.uint8(Source.PLANE))
-        return np.where(known, np.uint8(Source.NONE), mark)
+        return np.where(measured, np.uint8(Source.NONE), mark)
 
     def _flags(self, mask: BoolArray, grid: Grid) -> BoolArray:
         """Return a mask of the sheet at the nearest pixels of a grid."""
@@ -144,23 +144,23 @@ def _slope(photo: Photo, grid: Grid) -> Float32Array:
 
 
 def _kept(
-    relief: Float32Array, told: BoolArray, slope: Float32Array, bound: float, gsd: float
+    relief: Float32Array, measured: BoolArray, slope: Float32Array, bound: float, gsd: float
 ) -> BoolArray:
     """Return the known pixels that a picture keeps.
 
     Of what was measured all but crumbs on ground that hardly was, such as mirroring glass; of the
     rest broad even parts, and what moves the picture by more than the bound.
     """
-    known = np.isfinite(relief)
+    finite = np.isfinite(relief)
     even = _even(relief, slope)
     least = WHOLE.broad / gsd**2
     side = int(WHOLE.around / gsd) | 1
-    dense = cv2.blur(told.astype(np.float32), (side, side)) >= WHOLE.dense
-    sure = told & (dense | parts_of(told & even, least))
+    dense = cv2.blur(measured.astype(np.float32), (side, side)) >= WHOLE.dense
+    sure = measured & (dense | parts_of(measured & even, least))
     if not sure.any():
-        return known
-    away = np.where(known, np.abs(relief - membrane(relief, sure)) * slope, np.float32(0))
-    rest = known & ~sure
+        return finite
+    away = np.where(finite, np.abs(relief - membrane(relief, sure)) * slope, np.float32(0))
+    rest = finite & ~sure
     far = rest & (cv2.medianBlur(away.astype(np.float32), 5) > bound)
     kept = sure | parts_of(rest & even, least) | parts_of(far, WHOLE.piece / gsd**2)
     return _with_rims(kept, relief)
@@ -183,6 +183,6 @@ def _with_rims(kept: BoolArray, relief: Float32Array) -> BoolArray:
 def _even(relief: Float32Array, slope: Float32Array) -> BoolArray:
     """Return where relief moves the picture by less from pixel to pixel than `WHOLE.even`."""
     square = np.ones((3, 3), np.uint8)
-    known, far = np.isfinite(relief), np.float32(9e9)
-    high = cv2.dilate(np.where(known, relief, -far), square)
-    return (high - cv2.erode(np.where(known, relief, far), square)) * slope < WHOLE.even
+    finite, far = np.isfinite(relief), np.float32(9e9)
+    high = cv2.dilate(np.where(finite, relief, -far), square)
+    return (high - cv2.erode(np.where(finite, relief, far), square)) * slope < WHOLE.even

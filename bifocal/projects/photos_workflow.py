@@ -286,7 +286,7 @@ def _frame(
         places = np.array(list(named.values()))
         return frame, places, covariance, remark("projects.by_control"), [fits], []
     points = sparse_points(project, options.cloud)
-    said: list[str] = []
+    remarks: list[str] = []
     walls: list[ProjectWall] = []
     level = chosen(named, options.horizontal, "--horizontal") if options.horizontal else None
     if options.wall and not options.number:
@@ -305,7 +305,7 @@ def _frame(
         if level is not None:
             frame = framed(project, frame.rotation[2], points, level)
         if not options.number:
-            said.append(remark("projects.found", share=100 * wall.share))
+            remarks.append(remark("projects.found", share=100 * wall.share))
     covariance, scale = np.zeros((7, 7)), ""
     if options.length:
         *ends, metres = options.length
@@ -323,7 +323,7 @@ def _frame(
         scale = remark("projects.by_unit", unit=options.unit)
     elif project.metres:
         scale = remark("projects.by_project", by=project.metres)
-    return frame, points, covariance, scale, said, walls
+    return frame, points, covariance, scale, remarks, walls
 
 
 def _metres(text: str, ends: Sequence[str]) -> float:
@@ -368,7 +368,7 @@ def _photos(
     written: dict[tuple[object, ...], tuple[Lens, str]] = {}
     photos = []
     for view in views:
-        lens, found = Lens(**view.lens._asdict()), files[view.name]
+        lens, path = Lens(**view.lens._asdict()), files[view.name]
         key = (lens.camera_matrix.tobytes(), lens.coefficients.tobytes(), lens.image_size)
         name = ""
         if lens.coefficients.any() or lens.model == "fisheye":
@@ -383,7 +383,7 @@ def _photos(
                 plane_from_pixel=plane_from_pixel(camera),
                 nadir=camera.centre[:2],
                 distance=float(camera.centre[2]),
-                file=relative_name(found, out.parent) if found else PurePath(view.name).name,
+                file=relative_name(path, out.parent) if path else PurePath(view.name).name,
                 lens=lens if name else None,
                 image_size=lens.image_size,
                 extra={"lens": name} if name else {},
@@ -405,10 +405,10 @@ def _upright(view: ForeignView, path: Path | None) -> ForeignView:
     if path is None:
         return view
     info, size = image_info(path), tuple(map(int, view.lens.image_size))
-    known = (1,) if size[0] == size[1] else (1, 6, 8)
-    if info.size == size and info.orientation in known:
+    orientations = (1,) if size[0] == size[1] else (1, 6, 8)
+    if info.size == size and info.orientation in orientations:
         return view
-    if info.orientation in known[1:] and info.size == size[::-1]:
+    if info.orientation in orientations[1:] and info.size == size[::-1]:
         lens = lens_of_photo(Lens(**view.lens._asdict()), info.size, orientation=info.orientation)
         rotation, turn = view.rotation.copy(), np.array(TURNS[info.orientation])
         rotation[:2], shear = turn @ rotation[:2], turn @ view.shear @ turn.T

@@ -190,5 +190,5 @@ def turned_by_lines(
         return frame, [remark("projects.no_lines")]
     turn = float(np.median(turns))
     axes = rotation_from_vector([0.0, 0.0, -turn]) @ frame.rotation
-    told = remark("projects.turned", angle=np.rad2deg(turn), count=len(turns))
-    return replace(frame, rotation=axes), [told]
+    note = remark("projects.turned", angle=np.rad2deg(turn), count=len(turns))
+    return replace(frame, rotation=axes), [note]

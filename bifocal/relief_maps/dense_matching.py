@@ -233,16 +233,16 @@ def _seen_box(pair: Pair, box: Bounds, low: float, high: float) -> Bounds:
     return bounds_of(object_rays(plane_position(xyz, foot), foot).position)
 
 
-def _resampled(bands: MapBands, grid: Grid, wanted: Grid) -> MapBands:
+def _resampled(bands: MapBands, grid: Grid, target: Grid) -> MapBands:
     """Return the map on the grid asked for, interpolated if that is finer, but for steps."""
-    if wanted.gsd >= 0.999 * grid.gsd:
+    if target.gsd >= 0.999 * grid.gsd:
         return bands
-    column, row = wanted.offset_in(grid)
-    ratio = wanted.gsd / grid.gsd
+    column, row = target.offset_in(grid)
+    ratio = target.gsd / grid.gsd
     matrix = np.array([[ratio, 0, column], [0, ratio, row]])
 
     def warp(band: np.ndarray, how: int) -> np.ndarray:
-        size, flags = (wanted.width, wanted.height), how | cv2.WARP_INVERSE_MAP
+        size, flags = (target.width, target.height), how | cv2.WARP_INVERSE_MAP
         return cv2.warpAffine(band, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
     nearest, smoothed = warp(bands.r, cv2.INTER_NEAREST), warp(bands.r, cv2.INTER_LINEAR)

@@ -78,12 +78,12 @@ class PairRelief:
         return np.asarray((self.bands.quality == Quality.MEASURED) & np.isfinite(self.bands.r))
 
 
-def fused(found: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid) -> MapBands:
+def fused(maps: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid) -> MapBands:
     """Return the one map of several pairs.
 
     Parameters
     ----------
-    found : sequence of PairRelief
+    maps : sequence of PairRelief
     witnesses : sequence of Witness
         The photos.
     grid : Grid
@@ -94,23 +94,23 @@ def fused(found: Sequence[PairRelief], witnesses: Sequence[Witness], grid: Grid)
     Pairs that share a photo share its errors, and what makes one err at an edge makes the next err
     there: sigma is as if their errors were one, so more pairs make relief better than it says.
     """
-    measured = np.stack([one.measured for one in found])
-    open_ = _apart(found) | ~measured.any(axis=0)
-    result = _averaged(found, measured & ~open_)
+    measured = np.stack([one.measured for one in maps])
+    open_ = _apart(maps) | ~measured.any(axis=0)
+    result = _averaged(maps, measured & ~open_)
     photos, usual = exposed_alike(witnesses, result.r, grid)
-    misfits = np.stack([misfit(photos, one.bands.r, grid, open_, usual) for one in found])
+    misfits = np.stack([misfit(photos, one.bands.r, grid, open_, usual) for one in maps])
     near = min(witness.photo.distance for witness in witnesses)
-    _decide(result, found, misfits, open_, FUSION.in_front * near)
+    _decide(result, maps, misfits, open_, FUSION.in_front * near)
     rest = np.isfinite(result.r) & (result.quality != Quality.MEASURED)
     count = np.isfinite(shown_by(photos, result.r, grid, rest)).sum(axis=0)
     result.quality[rest] = np.where(count < 2, Quality.HIDDEN, Quality.INTERPOLATED)
     return result
 
 
-def _apart(found: Sequence[PairRelief]) -> BoolArray:
+def _apart(maps: Sequence[PairRelief]) -> BoolArray:
     """Return where two pairs differ visibly, or measured what differs beyond their sigmas."""
-    apart = np.zeros(found[0].bands.r.shape, bool)
-    for one, second in combinations(found, 2):
+    apart = np.zeros(maps[0].bands.r.shape, bool)
+    for one, second in combinations(maps, 2):
         variance = sum(of.bands.sigma**2 for of in (one, second))
         with np.errstate(invalid="ignore"):
             limit = np.minimum(FUSION.beyond * np.sqrt(variance), FUSION.visible)
@@ -120,10 +120,10 @@ def _apart(found: Sequence[PairRelief]) -> BoolArray:
     return apart
 
 
-def _averaged(found: Sequence[PairRelief], use: BoolArray) -> MapBands:
+def _averaged(maps: Sequence[PairRelief], use: BoolArray) -> MapBands:
     """Return the weighted mean of what was measured, with the sigma of errors that are one."""
     total, relief, square, variance = np.zeros((4, *use.shape[1:]), np.float32)
-    for one, mine in zip(found, use, strict=True):
+    for one, mine in zip(maps, use, strict=True):
         weight = np.where(mine, one.weight, np.float32(0))
         value = np.where(mine, one.bands.r, np.float32(0))
         total += weight
@@ -139,7 +139,7 @@ def _averaged(found: Sequence[PairRelief], use: BoolArray) -> MapBands:
 
 
 def _decide(
-    result: MapBands, found: Sequence[PairRelief], misfits: Float32Array, where: BoolArray,
+    result: MapBands, maps: Sequence[PairRelief], misfits: Float32Array, where: BoolArray,
     in_front: float,
 ) -> None:  # fmt: skip
     """Take the relief that the photos fit best, whether or not a pair measured it (in place).
@@ -153,7 +153,7 @@ def _decide(
     row, column = at
 
     def all_of(band: Callable[[PairRelief], Any]) -> Any:
-        return np.stack([band(one)[at] for one in found])
+        return np.stack([band(one)[at] for one in maps])
 
     relief, sigma = all_of(lambda one: one.bands.r), all_of(lambda one: one.bands.sigma)
     measured, finite = all_of(lambda one: one.measured), np.isfinite(relief)

@@ -94,14 +94,14 @@ def shown_by(
     row, column = np.nonzero(where & np.isfinite(relief))
     xyz = np.column_stack([grid.columns_x[column], grid.rows_y[row], relief[row, column]])
     values = np.full((len(witnesses), len(row)), np.nan, np.float32)
-    for own, witness in zip(values, witnesses, strict=True):
-        own[:] = witness.shows(xyz)
-        if np.isfinite(own).any():
+    for value, witness in zip(values, witnesses, strict=True):
+        value[:] = witness.shows(xyz)
+        if np.isfinite(value).any():
             foot, rays = witness.photo.foot, None
             if witness.photo.refracted:
                 low, high = float(np.nanmin(relief)), float(np.nanmax(relief))
                 foot, rays = straight(foot), RayField.over(foot, grid.bounds, (low, high))
-            own[hidden_on_map(relief, grid, foot, rays)[row, column]] = np.nan
+            value[hidden_on_map(relief, grid, foot, rays)[row, column]] = np.nan
     return values
 
 

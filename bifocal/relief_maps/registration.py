@@ -170,17 +170,17 @@ def _systematic(
 
 
 def least_absolute(
-    design: FloatArray, wanted: FloatArray, *, rounds: int, floor: float
+    design: FloatArray, values: FloatArray, *, rounds: int, floor: float
 ) -> FloatArray:
     """Return the solution of least absolute deviations, by reweighted least squares.
 
     Residuals below ``floor`` count as it: they would be weighted without bound.
     """
-    weight: FloatArray = np.ones(len(wanted))
+    weight: FloatArray = np.ones(len(values))
     solution: FloatArray = np.zeros(design.shape[1])
     for _ in range(rounds):
-        solution = np.linalg.lstsq(design * weight[:, None], wanted * weight, rcond=None)[0]
-        weight = 1 / np.sqrt(np.maximum(np.abs(wanted - design @ solution), floor))
+        solution = np.linalg.lstsq(design * weight[:, None], values * weight, rcond=None)[0]
+        weight = 1 / np.sqrt(np.maximum(np.abs(values - design @ solution), floor))
     return solution
 
 

@@ -230,11 +230,11 @@ def _guessed(level: _Level) -> _Found:
     return hypothesis
 
 
-def _refined(level: _Level, guess: _Found, taken: BoolArray) -> _Found:
+def _refined(level: _Level, guess: _Found, chosen: BoolArray) -> _Found:
     """Return what a sweep through the reliefs at hand finds where a guess differs from flow."""
     hypothesis, shape = _nothing(level), level.valid.shape
     for _, box in _tiles(shape):
-        if taken[_halves(box)].sum() > HYPOTHESIS.wanted:
+        if chosen[_halves(box)].sum() > HYPOTHESIS.wanted:
             wide = _widened(box, shape)
             values = guess.relief[_halves(wide)]
             supported = level.relief[wide][level.support[wide]][::4]
@@ -249,7 +249,7 @@ def _nothing(level: _Level) -> _Found:
     return _Found(empty, empty.copy(), empty.copy())
 
 
-def _sweep(found: _Found, level: _Level, box: Box, wide: Box, tried: Hypotheses) -> None:
+def _sweep(best: _Found, level: _Level, box: Box, wide: Box, tried: Hypotheses) -> None:
     """Sweep a tile with what is around it (in place)."""
     if len(tried.numbers) < HYPOTHESIS.fewest_tried:
         return
@@ -263,7 +263,7 @@ def _sweep(found: _Found, level: _Level, box: Box, wide: Box, tried: Hypotheses)
         slice(part.start - around.start, part.stop - around.start)
         for part, around in zip(box, wide, strict=True)
     )
-    for band, values in zip(found, (relief, cost, cost_kept - new), strict=True):
+    for band, values in zip(best, (relief, cost, cost_kept - new), strict=True):
         band[box] = values[inner]
 
 
@@ -373,16 +373,16 @@ def _in_company(level: _Level, hypothesis: _Found, finds: BoolArray) -> BoolArra
     return kept
 
 
-def _backed(level: _Level, found: _Found, taken: BoolArray) -> BoolArray:
+def _backed(level: _Level, best: _Found, chosen: BoolArray) -> BoolArray:
     """Return the parts of what is taken whose relief is even and at which both photos are alike."""
-    frame, relief = level.frame, np.where(taken, found.relief, level.relief)
+    frame, relief = level.frame, np.where(chosen, best.relief, level.relief)
     scale = parallax_per_metre(frame)
     side = 2 * HYPOTHESIS.rim + 1
     inside = is_inside(frame, level.relief).astype(np.uint8)
     out = (relief - level.relief) * scale > HYPOTHESIS.stands_out
     backing = _backing(relief, scale)
     least, most = HYPOTHESIS.backing
-    kept = taken & out & (backing >= least) & (cv2.erode(inside, np.ones((side, side))) > 0)
+    kept = chosen & out & (backing >= least) & (cv2.erode(inside, np.ones((side, side))) > 0)
     vouching = kept & (backing >= most) & (_likeness(frame, relief) > HYPOTHESIS.alike)
     count, part = cv2.connectedComponents(kept.astype(np.uint8), connectivity=8)
     enough = np.bincount(part[vouching], minlength=count) >= HYPOTHESIS.vouching

@@ -334,12 +334,12 @@ def _pixel(photo: Photo, grey: ByteArray, xy: FloatArray) -> FloatArray:
     return np.asarray(np.where(inside, side, np.inf))
 
 
-def _parallax(photos: PhotoSet, one: int, other: int, xy: FloatArray) -> FloatArray:
+def _parallax(photos: PhotoSet, first: int, second: int, xy: FloatArray) -> FloatArray:
     """Return how places part in two photos per metre of relief, (..., 2). [m/m]
 
     Eq. (1) at r = 0: a point is seen ``r (P - N) / d`` beside its place.
     """
-    a, b = photos.photos[one], photos.photos[other]
+    a, b = photos.photos[first], photos.photos[second]
     return np.asarray((xy - a.nadir) / a.distance - (xy - b.nadir) / b.distance)
 
 

@@ -15,7 +15,7 @@ SIGMAS = ("sigma_X", "sigma_Y", "sigma_r")
 
 
 def check_points(
-    table: ReliefTable, known: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
+    table: ReliefTable, reference: KnownPoints, rules: tuple[ToleranceRule, ...] = RULES
 ) -> CheckResult:
     """Compare solved points with what was measured on site.
 
@@ -23,7 +23,7 @@ def check_points(
     ----------
     table : ReliefTable
         Solved points; those flagged as one of `UNCOUNTED` are not counted.
-    known : KnownPoints
+    reference : KnownPoints
         Check points; any coordinate may be NaN.
     rules : tuple of ToleranceRule
         Rules for the verdict.
@@ -33,23 +33,23 @@ def check_points(
     CheckResult
         RMSE is ``sqrt(sum(error^2)/n)``: no mean is taken off, a bias counts in full.
     """
-    solved = known.coordinates_in(table)
-    rows = known.rows_in(table)
+    solved = reference.coordinates_in(table)
+    rows = reference.rows_in(table)
     flags = np.array([*table.flags, ""])[rows]
-    compared = known.used & ~np.isnan(known.xyz).all(axis=1)
+    compared = reference.used & ~np.isnan(reference.xyz).all(axis=1)
     flagged = compared & np.isin(flags, UNCOUNTED)
-    errors = np.where((known.used & ~flagged)[:, None], solved - known.xyz, np.nan)
+    errors = np.where((reference.used & ~flagged)[:, None], solved - reference.xyz, np.nan)
     sigma = np.stack([table[key] for key in SIGMAS], axis=-1) if len(table) else np.zeros((0, 3))
     axes = {name: statistics(errors[:, i]) for i, name in enumerate("XYZ")}
     accuracy = max((axis.rmse for axis in axes.values() if axis.n), default=float("nan"))
     return CheckResult(
-        ids=known.ids,
+        ids=reference.ids,
         solved=solved,
         errors=errors,
         axes=axes,
         verdicts=judge(accuracy, rules) if np.isfinite(accuracy) else (),
-        missing=known.missing_in(table),
-        flagged={known.ids[row]: str(flags[row]) for row in np.flatnonzero(flagged)},
+        missing=reference.missing_in(table),
+        flagged={reference.ids[row]: str(flags[row]) for row in np.flatnonzero(flagged)},
         standardised=errors / np.vstack([sigma, np.full((1, 3), np.nan)])[rows],
     )
 

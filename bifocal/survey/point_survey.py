@@ -98,7 +98,8 @@ def solve_points(
         (d_far, far), (d_near, near) = _far_first((d1, s1), (d2, s2))
         r = relief(far, near, d1=d_far, d2=d_near)  # Eq. (6)
         e1, e2 = (  # Eqs. (1) and (3)
-            relief_displacement(own, r, d=d) for own, d in ((radii.own1, d1), (radii.own2, d2))
+            relief_displacement(radius, r, d=d)
+            for radius, d in ((radii.own1, d1), (radii.own2, d2))
         )
     x, y = plane_coordinates(radii.own1, e1, np.radians(radii.own_theta))  # Eq. (7)
     if radii.bent is not None:

@@ -112,18 +112,18 @@ def unused_remarks(unused: Collection[str], **listed: KnownPoints) -> list[str]:
     return remarks
 
 
-def opposite_signs_remark(table: ReliefTable, known: KnownPoints) -> list[str]:
+def opposite_signs_remark(table: ReliefTable, reference: KnownPoints) -> list[str]:
     """Return a warning where most points of known relief come out with the opposite sign."""
-    rows = known.rows_in(table)
-    here = known.used & (rows >= 0)
-    r, z, sigma = table["r"][rows[here]], known.xyz[here, 2], table["sigma_r"][rows[here]]
+    rows = reference.rows_in(table)
+    here = reference.used & (rows >= 0)
+    r, z, sigma = table["r"][rows[here]], reference.xyz[here, 2], table["sigma_r"][rows[here]]
     # Signs tell nothing where relief is not different from zero.
     clear = np.minimum(np.abs(r), np.abs(z)) > 2 * sigma
     opposite = np.flatnonzero(clear & (r * z < 0))
     if len(opposite) < 2 or 2 * len(opposite) <= clear.sum():
         return []
     worst = opposite[np.abs(z[opposite]).argmax()]
-    name = np.array(known.ids)[here][worst]
+    name = np.array(reference.ids)[here][worst]
     count = {"count": len(opposite), "all": int(clear.sum())}
     return [remark("survey.opposite_signs", name=name, found=r[worst], known=z[worst], **count)]
 

@@ -87,19 +87,19 @@ def where_of(table: Table) -> str:
     return f"{table.file} › {table.sheet}" if table.sheet else table.file
 
 
-def with_measured(known: KnownPoints, points: PointObservations) -> KnownPoints:
+def with_measured(reference: KnownPoints, points: PointObservations) -> KnownPoints:
     """Add relief measured on site, given beside the points, to the check points."""
     rows = [
         i
         for i in np.flatnonzero(~np.isnan(points.r_measured) & points.use)
-        if points.ids[i] not in known.ids
+        if points.ids[i] not in reference.ids
     ]
     if not rows:
-        return known
+        return reference
     nothing = np.full(len(rows), np.nan)
     more = np.stack([nothing, nothing, points.r_measured[rows]], axis=-1)
     return KnownPoints(
-        ids=(*known.ids, *(points.ids[i] for i in rows)),
-        xyz=np.vstack([known.xyz, more]),
-        use=np.concatenate([known.used, np.ones(len(rows), dtype=bool)]),
+        ids=(*reference.ids, *(points.ids[i] for i in rows)),
+        xyz=np.vstack([reference.xyz, more]),
+        use=np.concatenate([reference.used, np.ones(len(rows), dtype=bool)]),
     )

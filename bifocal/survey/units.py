@@ -210,7 +210,7 @@ def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> P
     polar = points.is_polar & missing & ~cartesian
     if polar.any():
         _refuse_polar(pair, points, polar & points.use, where)
-    for rows, both, own in (
+    for rows, both, image in (
         (cartesian, (points.xy1, points.xy2), unit),
         (polar, points.polar_xy(), "mm"),
     ):
@@ -220,7 +220,7 @@ def as_pixels(pair: Pair, points: PointObservations, where: str, unit: str) -> P
         for number, (photo, xy) in enumerate(zip((pair.image1, pair.image2), both, strict=True), 1):
             typed = np.where(rows[:, None], xy, np.nan)
             pixels.append(
-                typed if own == "px" else _pixels_of_mm(photo, f"image{number}", typed, where)
+                typed if image == "px" else _pixels_of_mm(photo, f"image{number}", typed, where)
             )
         points = replace(
             points,

@@ -193,14 +193,14 @@ class SurveyContent:
         matrices = self.setup.adjusted if self.setup is not None else ()
         return [image for image, matrix in enumerate(matrices, 1) if matrix is not None]
 
-    def point_columns(self, **there: bool) -> tuple[LiveColumn, ...]:
+    def point_columns(self, **facts: bool) -> tuple[LiveColumn, ...]:
         """Return the columns of `Points`; of an ideal pair those of the inputs that are there."""
         if self.is_pair:
             return pair_points(
                 undistorted=self.undistorted, media=self.media_cells, leaning=self.leaning
             )
         return ideal_points(
-            **there, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens,
+            **facts, adjusted=self.corrected, media=self.media_cells, lens=self.has_lens,
             others=self.others,
         )  # fmt: skip
 
@@ -349,9 +349,9 @@ def _pair_cells(content: SurveyContent, first: Photo, second: Photo) -> dict[str
 
 def check_cells(content: SurveyContent) -> dict[str, list[CellValue]]:
     """Return the columns of `Check` that are typed, by key."""
-    known = content.known
-    cells = named_rows(known.ids, known.used)
-    return cells | {f"{axis}_ref": inputs(known.xyz[:, i]) for i, axis in enumerate("XYZ")}
+    reference = content.known
+    cells = named_rows(reference.ids, reference.used)
+    return cells | {f"{axis}_ref": inputs(reference.xyz[:, i]) for i, axis in enumerate("XYZ")}
 
 
 def control_cells(content: SurveyContent) -> dict[str, list[CellValue]]:

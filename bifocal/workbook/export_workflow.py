@@ -30,10 +30,10 @@ def export(
         points, remarks = read_survey_points(source)
     except InputError:
         # A survey workbook that no program has calculated yet: its points, its set-up as typed.
-        found = points_of(source) if is_workbook(source) and is_survey(source) else None
-        if found is None:
+        solved = points_of(source) if is_workbook(source) and is_survey(source) else None
+        if solved is None:
             raise
-        points, remarks = found, ()
+        points, remarks = solved, ()
     with located(source):
         more = export_points(
             out, points, world=world, order=order, flavour=flavour, ellipses=ellipses,
@@ -61,8 +61,8 @@ def _export_shifts(source: Path, out: Path, *, overwrite: bool) -> tuple[str, ..
     if not good.any():
         raise InputError(f"{source}: {remark('export.no_shifts')}")
     write_shifts(out, (feet - moves)[good], feet[good], places[good], overwrite=overwrite)
-    left = [name for name, is_good in zip(table.ids, good, strict=True) if not is_good]
-    if not left:
+    unsolved = [name for name, is_good in zip(table.ids, good, strict=True) if not is_good]
+    if not unsolved:
         return ()
-    shown = ", ".join(left[:10]) + (" ..." if len(left) > 10 else "")
-    return (remark("export.not_trusted", count=len(left), names=shown),)
+    shown = ", ".join(unsolved[:10]) + (" ..." if len(unsolved) > 10 else "")
+    return (remark("export.not_trusted", count=len(unsolved), names=shown),)

@@ -123,18 +123,18 @@ def match_set_file(
     def greys(first: int, second: int) -> tuple[ByteArray, ByteArray]:
         return read_greys(paths[first], paths[second], in_water=photos.layers is not None)
 
-    found = match_set(photos, greys, settings)
-    found.write(out, overwrite=overwrite)
-    picked = np.isfinite(found.pixels[..., 0])
-    low, high = np.nanpercentile(found.points.xyz[:, 2], [1, 99])
+    matches = match_set(photos, greys, settings)
+    matches.write(out, overwrite=overwrite)
+    picked = np.isfinite(matches.pixels[..., 0])
+    low, high = np.nanpercentile(matches.points.xyz[:, 2], [1, 99])
     return {
-        "count": len(found.ids),
+        "count": len(matches.ids),
         "photos": dict(zip(photos.names, picked.sum(axis=1).tolist(), strict=True)),
         "in_three": int((picked.sum(axis=0) > 2).sum()),
-        "kinds": {kind: found.kinds.count(kind) for kind in sorted(set(found.kinds))},
-        "sigma_px": found.sigma_px,
+        "kinds": {kind: matches.kinds.count(kind) for kind in sorted(set(matches.kinds))},
+        "sigma_px": matches.sigma_px,
         "relief_range": (float(low), float(high)),
-        "sigma_r_median": float(np.nanmedian(found.points.sigma[:, 2])),
+        "sigma_r_median": float(np.nanmedian(matches.points.sigma[:, 2])),
     }
 
 

@@ -81,8 +81,8 @@ def write_result(
     if ending not in (".xlsx", ".xlsm"):
         raise InputError(f"{path}: results are written as .xlsx, .xlsm or .csv.")
     if solution.photos is not None:
-        said = export_points(path, solution.to_points(), overwrite=overwrite)
-        return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *said])
+        note = export_points(path, solution.to_points(), overwrite=overwrite)
+        return " ".join([remark("survey.set_as_values", count=len(solution.photos)), *note])
     if len(solution.table) > MOST_ROWS:
         about = {"count": len(solution.table), "name": path.with_suffix(".csv").name}
         raise InputError(remark("survey.too_many_points", of=path, limit=MOST_ROWS, **about))
@@ -116,9 +116,14 @@ def _is_survey_book(solution: SolvedSurvey) -> bool:
 
 def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
     """Put the results into a survey workbook; return where its old state is kept."""
-    own = typed_content(solution, content)
+    typed = typed_content(solution, content)
     done = update_book(
-        solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
+        solution.source,
+        path,
+        solution.survey,
+        typed,
+        options=_options(solution),
+        overwrite=overwrite,
     )
     kept = _kept_as(done.kept)
     if done.added:
@@ -129,12 +134,12 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
 
 def _options(solution: SolvedSurvey) -> dict[str, object]:
     """Return all that options put in the place of what a workbook says."""
-    given = dict(solution.given)
+    options = dict(solution.given)
     if solution.rules != RULES:
-        given["rules"] = solution.rules
+        options["rules"] = solution.rules
     if solution.adjusted:
-        given["adjust_setup"] = True
-    return given
+        options["adjust_setup"] = True
+    return options
 
 
 def _add_columns(
@@ -143,13 +148,18 @@ def _add_columns(
     """Put the results beside the user's own table; return where its old state is kept."""
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
         raise InputError(remark("survey.no_macros", of=path))
-    own = typed_content(solution, content)
+    typed = typed_content(solution, content)
     done = add_results(
-        solution.source, path, solution.survey, own, given=_options(solution), overwrite=overwrite
+        solution.source,
+        path,
+        solution.survey,
+        typed,
+        options=_options(solution),
+        overwrite=overwrite,
     )
-    said = "the results are new columns of your table"
-    said = f"{said}; {_kept_as(done.kept)}" if done.kept else f"{said}."
-    return " ".join([said, *done.remarks])
+    note = "the results are new columns of your table"
+    note = f"{note}; {_kept_as(done.kept)}" if done.kept else f"{note}."
+    return " ".join([note, *done.remarks])
 
 
 def _left_behind(solution: SolvedSurvey) -> str:
@@ -160,12 +170,12 @@ def _left_behind(solution: SolvedSurvey) -> str:
     # A survey workbook saved as .ods has lost its tables, but not its sheets.
     is_ours = survey.is_ours or {"setup", "points"} <= {*map(bare, survey.titles)}
     others = [title for title in survey.titles if bare(title) not in _OURS or not is_ours]
-    said = f"a new workbook; {source.name} stays as it is"
+    note = f"a new workbook; {source.name} stays as it is"
     if source.suffix.lower() in (".xlsx", ".xlsm") and not survey.is_ours:
-        return f"{said} (--out {source} --overwrite puts the results into its own table)."
+        return f"{note} (--out {source} --overwrite puts the results into its own table)."
     if not others:
-        return f"{said}."
-    return f"{said}, and what else it holds is not in the new one: {', '.join(others)}."
+        return f"{note}."
+    return f"{note}, and what else it holds is not in the new one: {', '.join(others)}."
 
 
 def _kept_as(kept: Path | None) -> str:
@@ -183,10 +193,12 @@ def typed_content(solution: SolvedSurvey, content: SurveyContent) -> SurveyConte
         setup, points = _uncorrected(solution, setup)
     if solution.pair.exchanged and setup is not None:
         setup, points = setup.exchanged(), points.exchanged()
-    listed, known = len(solution.survey.known_rows), solution.survey.known
-    known = KnownPoints(ids=known.ids[:listed], xyz=known.xyz[:listed], use=known.used[:listed])
+    listed, reference = len(solution.survey.known_rows), solution.survey.known
+    reference = KnownPoints(
+        ids=reference.ids[:listed], xyz=reference.xyz[:listed], use=reference.used[:listed]
+    )
     exchanged = solution.pair.exchanged
-    return replace(content, setup=setup, as_given=exchanged, points=points, known=known)
+    return replace(content, setup=setup, as_given=exchanged, points=points, known=reference)
 
 
 def _uncorrected(

@@ -126,10 +126,10 @@ def _general(setup: SurveySetup, path: Path) -> Pair:
         pair = pair.in_air()
     first, second = pair.as_given
     typed = _photo_files(setup, path.parent)
-    given = Pair.read(file) if file is not None and not all(typed) else None
-    if given is not None:
+    stated = Pair.read(file) if file is not None and not all(typed) else None
+    if stated is not None:
         typed = tuple(
-            own or str(given.photo_file(number)) for number, own in enumerate(typed, start=1)
+            name or str(stated.photo_file(number)) for number, name in enumerate(typed, start=1)
         )
     if not all(typed):
         raise InputError(NO_PHOTOS)

@@ -92,38 +92,38 @@ def _called(photos: PhotoSet | Pair | Path | str | None) -> list[tuple[str, ...]
 
 
 def set_or_pair(
-    given: PhotoSet | Pair | Path | str | None,
+    source: PhotoSet | Pair | Path | str | None,
 ) -> tuple[PhotoSet | None, Pair | Path | str | None]:
     """Return a set of more than two photos, or what is a pair's; a set of two is one."""
-    photos = given if isinstance(given, PhotoSet) else None
-    if isinstance(given, Path | str) and Path(given).suffix.lower() == ".json":
-        is_set = read_object(given, what="pair file").get("format") == SET_FORMAT
-        photos = PhotoSet.read(given) if is_set else None
+    photos = source if isinstance(source, PhotoSet) else None
+    if isinstance(source, Path | str) and Path(source).suffix.lower() == ".json":
+        is_set = read_object(source, what="pair file").get("format") == SET_FORMAT
+        photos = PhotoSet.read(source) if is_set else None
     if photos is None or len(photos) > 2:
-        return photos, None if photos else given  # type: ignore[return-value]
+        return photos, None if photos else source  # type: ignore[return-value]
     return None, Pair.from_dict(photos.to_dict(), folder=photos.folder)
 
 
 def set_up(
     survey: SurveyInput,
     pair: Pair | Path | str | None,
-    given: Mapping[str, object],
+    settings: Mapping[str, object],
     options: ReadOptions,
 ) -> tuple[SurveyInput, Pair | Path | str | None]:
     """Return the points with the set-up that holds for them, and the pair where it is not that."""
     if isinstance(pair, Path | str) and Path(pair).suffix.lower() in BOOKS:
         survey, pair = _with_setup_of(Path(pair), survey, options.given), None
-    setup = survey.setup.but(**{"unit": survey.unit or survey.setup.unit, **given})
+    setup = survey.setup.but(**{"unit": survey.unit or survey.setup.unit, **settings})
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
     if pair is None:
-        refuse_far_stations(setup.taking.d1, setup.taking.d2, setup.where, options=given)
+        refuse_far_stations(setup.taking.d1, setup.taking.d2, setup.where, options=settings)
     return replace(survey, setup=setup), pair
 
 
-def _with_setup_of(path: Path, survey: SurveyInput, given: Collection[str]) -> SurveyInput:
+def _with_setup_of(path: Path, survey: SurveyInput, settings: Collection[str]) -> SurveyInput:
     """Return measured points with the set-up, check and control points of a survey workbook."""
-    book = read_survey(path, ReadOptions(given=given))
+    book = read_survey(path, ReadOptions(given=settings))
     setup = book.setup
     if setup.pair_file:
         setup = replace(setup, pair_file=str((path.parent / setup.pair_file).resolve()))
@@ -146,18 +146,18 @@ def given_pair(
     if isinstance(pair, Pair):
         return pair, None, list(pair.remarks)
     if pair is not None:
-        given = Pair.read(pair)
-        return given, Path(pair), [f"{pair}: {remark}" for remark in given.remarks]
+        stated = Pair.read(pair)
+        return stated, Path(pair), [f"{pair}: {remark}" for remark in stated.remarks]
     setup = survey.setup
     named = path.parent / setup.pair_file if setup.pair_file else None
     file = named if named is not None and named.is_file() else None
     described = described_pair(setup, file, path.parent)
     if described is None:
         return None, None, []
-    said = described.remarks
+    remarks = described.remarks
     if setup.media and not setup.refracted:
-        said = tuple(remark for remark in said if not remark.startswith("layers:"))
-    return described, file, [f"{setup.where}: {remark}" for remark in said]
+        remarks = tuple(remark for remark in remarks if not remark.startswith("layers:"))
+    return described, file, [f"{setup.where}: {remark}" for remark in remarks]
 
 
 def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair | None:
@@ -180,16 +180,16 @@ def described_pair(setup: SurveySetup, file: Path | None, folder: Path) -> Pair 
         remarks.append(remark("survey.no_lens", file=setup.pair_file))
     if file is not None:
         try:
-            given = Pair.read(file)
-            extra = {"setup": given.extra.get("setup")}
-            lenses = [given.image1.lens, given.image2.lens]
-            sizes = [given.image1.image_size, given.image2.image_size]
-            if not setup.media or setup.media.layers == given.layers:
-                orientation = given.orientation  # it may count the media too
+            stated = Pair.read(file)
+            extra = {"setup": stated.extra.get("setup")}
+            lenses = [stated.image1.lens, stated.image2.lens]
+            sizes = [stated.image1.image_size, stated.image2.image_size]
+            if not setup.media or setup.media.layers == stated.layers:
+                orientation = stated.orientation  # it may count the media too
             if not setup.media:
                 media = [
                     MediaOfPhoto(layers=p.layers, z0=p.z0, interface_normal=p.interface_normal)
-                    for p in (given.image1, given.image2)
+                    for p in (stated.image1, stated.image2)
                 ]
         except (InputError, GeometryError) as error:
             remarks.append(remark("survey.lens_unusable", file=setup.pair_file, why=error))

@@ -81,7 +81,7 @@ def write_template(
         raise InputError("what_if: is for photos in air.")
     cells = None if media is None else SurveyMedia.blank(media)
     check_book_path(path)
-    check_new_workbook(path, overwrite=overwrite, other="")
+    check_new_workbook(path, overwrite=overwrite, suffix="")
     content = SurveyContent(
         language=language, rows=rows, media=cells, lens=lens, functions=functions, plain=plain,
         other_photos=photos - 2, changes={} if what_if else None,

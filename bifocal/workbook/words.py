@@ -15,13 +15,13 @@ def readme(language: str, *, media: bool = False, leaning: bool = False) -> list
     lines = WORDS.readme(language)
     if not media:
         return lines
-    told = WORDS.content["readme_leaning" if leaning else "readme_media"]
-    bent = str(told[language]).splitlines()
+    texts = WORDS.content["readme_leaning" if leaning else "readme_media"]
+    bent = str(texts[language]).splitlines()
     first = next(row for row, line in enumerate(lines) if line.startswith("ds ="))
     return [*lines[:first], *bent, *lines[first + len(bent) :]]
 
 
 def headings(section: str, key: str) -> tuple[str, ...]:
     """Return every heading of a column, or label of a cell of ``setup``, that is understood."""
-    known = term(section, key)
-    return (*(known.names if known else ()), *WORDS.content["headings"].get(key, ()))
+    entry = term(section, key)
+    return (*(entry.names if entry else ()), *WORDS.content["headings"].get(key, ()))

@@ -103,20 +103,20 @@ def solve(
     >>> survey.table.xyz.round(9).tolist(), survey.table.flags
     ([[2.0, 0.0, 1.0]], ('OK',))
     """
-    given = given_of(taking) | given_of(measuring)
-    refuse_not_above_zero(**given, scale_tolerance=scale_tolerance)
+    settings = given_of(taking) | given_of(measuring)
+    refuse_not_above_zero(**settings, scale_tolerance=scale_tolerance)
     judged = tuple(as_rule(rule) for rule in rules) or RULES
     more = {"pair": pair, "model": model, "control": control}
-    asked = given | {name: value for name, value in more.items() if value is not None}
+    requests = settings | {name: value for name, value in more.items() if value is not None}
     photos, pair = set_or_pair(pair)
     count = 2 if photos is None else len(photos)
-    options = replace(reading or ReadOptions(), given=tuple(cells_of(asked)), photos=count)
-    survey, path = measured(source, options, given.get("unit"), photos or pair)
+    options = replace(reading or ReadOptions(), given=tuple(cells_of(requests)), photos=count)
+    survey, path = measured(source, options, settings.get("unit"), photos or pair)
     if control is not None:
         survey = with_list(survey, control, options.decimal, control_order)
     if photos is not None:
-        return _solved_of_set(survey, photos, path, asked, rules=judged, adjust=adjust_setup)
-    survey, pair = set_up(survey, pair, given, options)
+        return _solved_of_set(survey, photos, path, requests, rules=judged, adjust=adjust_setup)
+    survey, pair = set_up(survey, pair, settings, options)
     general, pair_path, pair_remarks = given_pair(survey, path, pair)
     # What is wrong with the pair comes first.
     survey = replace(survey, model=model or survey.model, remarks=(*pair_remarks, *survey.remarks))
@@ -127,7 +127,7 @@ def solve(
     media = solved.media
     if general is not None and pair is not None:  # the cells of media take those of its file
         media = SurveyMedia.of_photos((general.image1, general.image2), media)
-    return replace(solved, media=media, source=path, pair_path=pair_path, given=asked)
+    return replace(solved, media=media, source=path, pair_path=pair_path, given=requests)
 
 
 def _photos_contradict(solved: SolvedSurvey, pair: Pair | None) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def _solved_of_set(
     survey: SurveyInput,
     photos: PhotoSet,
     path: Path,
-    asked: Mapping[str, Any],
+    requests: Mapping[str, Any],
     *,
     rules: tuple[ToleranceRule, ...],
     adjust: bool,
@@ -158,20 +158,20 @@ def _solved_of_set(
         If an option goes with pairs alone, or there are no points.
     """
     names = {"pair", "model", "control", *(f.name for f in fields(Measuring))}
-    idle = ["adjust_setup"] if adjust else [name for name in asked if name not in names]
+    idle = ["adjust_setup"] if adjust else [name for name in requests if name not in names]
     if idle:
         raise InputError(remark("survey.not_of_a_set", option=idle[0], count=len(photos)))
     if not len(survey.points):
         raise InputError(f"{survey.where}: there is no point. Fill in the measured points.")
     others = ("pair", "model", "control")
-    given = {name: value for name, value in asked.items() if name not in others}
-    said = (*photos.remarks, *survey.remarks)
+    settings = {name: value for name, value in requests.items() if name not in others}
+    remarks = (*photos.remarks, *survey.remarks)
     survey = replace(
         survey,
-        setup=survey.setup.but(**given),
-        model=asked.get("model", survey.model),
-        remarks=said,
+        setup=survey.setup.but(**settings),
+        model=requests.get("model", survey.model),
+        remarks=remarks,
     )
     solved = solve_survey_of_set(survey, photos, rules=rules)
-    file = None if isinstance(asked["pair"], PhotoSet) else Path(asked["pair"])
-    return replace(solved, source=path, pair_path=file, given=asked)
+    file = None if isinstance(requests["pair"], PhotoSet) else Path(requests["pair"])
+    return replace(solved, source=path, pair_path=file, given=requests)

@@ -150,14 +150,14 @@ def interior_group(camera: str, shared: bool | Mapping[str, str]) -> str:
 
 
 def _media_columns(
-    project: Project, wanted: Sequence[str], labels: dict[str, int]
+    project: Project, parameters: Sequence[str], labels: dict[str, int]
 ) -> dict[str, Places]:
     """Append the media unknowns to labels and return the columns of each media."""
     used = [name for name in dict.fromkeys(project.media_of) if name]
-    if wanted and not used:
+    if parameters and not used:
         raise InputError("media: no camera looks through anything; there is nothing to estimate.")
     columns: dict[str, dict[str, int]] = {}
-    for item in wanted:
+    for item in parameters:
         who, _, parameter = item.rpartition(":")
         for owner in [who] if who else used:
             if owner not in project.media:
@@ -171,7 +171,7 @@ def _media_columns(
                 )
             of_medium = columns.setdefault(owner, {})
             if parameter in of_medium:
-                raise InputError(f"media: {', '.join(wanted)} names the same unknown twice.")
+                raise InputError(f"media: {', '.join(parameters)} names the same unknown twice.")
             common = not who and parameter.startswith(OF_MATERIAL)
             label = parameter if common else f"{owner}:{parameter}"
             of_medium[parameter] = labels.setdefault(label, len(labels))

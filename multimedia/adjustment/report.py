@@ -136,10 +136,12 @@ def _model(result: Adjustment, say: Words, points: int) -> str:
         names = media.parameter_names if media is not None else ()
         kept = [n for n in names if n.startswith(("index", "thickness", "radius", "gradient"))]
         assumed |= dict.fromkeys(name for name in kept if name != "index1")
-    left = [name for name in assumed if name not in interior]
+    remaining = [name for name in assumed if name not in interior]
     nothing = say("nothing")
     return say(
-        "estimated", estimated=", ".join(estimated) or nothing, assumed=", ".join(left) or nothing
+        "estimated",
+        estimated=", ".join(estimated) or nothing,
+        assumed=", ".join(remaining) or nothing,
     )
 
 

@@ -284,16 +284,16 @@ def _groups(ordered: FloatArray, width: float) -> list[_Group]:
     # The point in the middle is there anyway: how likely are the others?
     chance = poisson.logsf(inside - 2.0, expected)
     order = np.argsort(chance, kind="stable")
-    found: list[_Group] = []
+    groups: list[_Group] = []
     for k in order[chance[order] < np.log(CHANCE)].tolist():
         middle = float(ordered[k])
-        if inside[k] >= FEWEST and all(abs(middle - g.middle) > 4.0 * width for g in found):
+        if inside[k] >= FEWEST and all(abs(middle - g.middle) > 4.0 * width for g in groups):
             within = ordered[np.abs(ordered - middle) <= 2.0 * width]
             density = float(inside[k]) / (4.0 * width)
-            found.append(
+            groups.append(
                 _Group(float(chance[k]), float(np.median(within)), width, density, len(within))
             )
-    return found
+    return groups
 
 
 class _Mixture:

@@ -120,7 +120,7 @@ def correct_bathymetry(
     surface, n_water = as_water_surface(water_level), checked_water_index(refractive_index)
     rises = _checked_rise(rise, cameras, surface)
     centres = _checked_cameras(cameras, surface, rises)
-    seen = VisiblePoints.checked(visible, centres, max_angle, shape)
+    rays = VisiblePoints.checked(visible, centres, max_angle, shape)
     precision = precision or Precision()
     if precision.wave[0] > 0 and not isinstance(surface, Plane):
         raise InputError("precision: a wave upon what has its own form; give the mean height.")
@@ -128,7 +128,7 @@ def correct_bathymetry(
     result = (
         np.empty((count, 3)), np.empty(count), np.empty(count, np.int64), np.empty((count, 3, 3))
     )  # fmt: skip
-    for part, row, camera in seen.blocks(flat, BLOCK_RAYS):
+    for part, row, camera in rays.blocks(flat, BLOCK_RAYS):
         pairs = (row, camera)
         corrected = _correct_block(flat[part], surface, n_water, centres, rises, pairs, precision)
         for whole, piece in zip(result, corrected, strict=True):
@@ -161,10 +161,10 @@ def _correct_block(
     status[~np.isfinite(apparent).all(-1)] = BathymetryStatus.FAILED
     xyz = apparent.copy()
     covariance = np.broadcast_to(np.eye(3) * precision.point**2, (len(xyz), 3, 3)).copy()
-    seen = np.bincount(pairs[0], minlength=len(xyz)) >= 2
+    intersected = np.bincount(pairs[0], minlength=len(xyz)) >= 2
     highest = rises.max(initial=0.0)
     # Between low and high water the rays decide.
-    rows = np.flatnonzero(seen & (below > -highest))
+    rows = np.flatnonzero(intersected & (below > -highest))
     wet = np.flatnonzero(status == BathymetryStatus.NADIR)
     xyz[wet, 2] = level[wet] - index * below[wet]
     covariance[wet, 2, 2] = (

@@ -139,8 +139,8 @@ def depth_offsets(
     """
     offset, depth = as_floats(offsets, "offsets"), as_floats(depths, "depths")
     sigma = np.full(offset.shape, np.nan) if sigmas is None else as_floats(sigmas, "sigmas")
-    known = np.isfinite(offset) & np.isfinite(depth)
-    offset, depth, sigma = offset[known], depth[known], sigma[known]
+    finite = np.isfinite(offset) & np.isfinite(depth)
+    offset, depth, sigma = offset[finite], depth[finite], sigma[finite]
     if not len(offset):
         raise GeometryError("no sounding lies on the surface.")
     bounds = _round_edges(depth) if edges is None else as_floats(edges, "depth classes")
@@ -193,11 +193,11 @@ def _trend(offset: FloatArray, depth: FloatArray) -> DepthTrend | None:
         design = np.column_stack([np.ones(len(depth)), depth])
         inverse = np.linalg.inv(design[used].T @ design[used])
         line = inverse @ design[used].T @ offset[used]
-        left = offset - design @ line
-        inside = np.abs(left) <= GROSS * max(robust_sigma(left[used]), 1e-12)
+        residuals = offset - design @ line
+        inside = np.abs(residuals) <= GROSS * max(robust_sigma(residuals[used]), 1e-12)
         if (inside | ~used).all():
             freedom = int(used.sum()) - 2
-            sigma = np.sqrt(np.diag(inverse) * (left[used] ** 2).sum() / freedom)
+            sigma = np.sqrt(np.diag(inverse) * (residuals[used] ** 2).sum() / freedom)
             return DepthTrend(
                 at_surface=float(line[0]), per_metre=float(line[1]),
                 at_surface_sigma=float(sigma[0]), per_metre_sigma=float(sigma[1]),

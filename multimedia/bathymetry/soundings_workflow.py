@@ -88,8 +88,8 @@ def check_soundings(
     check_ending(target, "offsets of soundings are written as .csv.", ".csv")
     check_all_writable(target, overwrite=overwrite)
     check_not_input(target, surface, soundings)
-    names, xyz, own, remarks = _points(soundings)
-    own = np.where(np.isfinite(own), own, sigma)
+    names, xyz, sigmas, remarks = _points(soundings)
+    sigmas = np.where(np.isfinite(sigmas), sigmas, sigma)
     if surface.suffix.lower() in (".tif", ".tiff"):
         height, its = _of_dem(surface, xyz[:, :2], remarks)
     else:
@@ -101,7 +101,7 @@ def check_soundings(
             f"{soundings}: none of {len(offset)} soundings lies on {surface}; are both in one "
             "reference system?"
         )
-    total = np.hypot(np.nan_to_num(its), own)
+    total = np.hypot(np.nan_to_num(its), sigmas)
     total[total == 0] = np.nan
     water = read_water_surface(water_level)
     level = water.height_at(xyz[:, :2])
@@ -152,11 +152,11 @@ def _whole(
     cloud = open_cloud(path)
     xyz, sigma, names = [], [], list[str]()
     for piece in cloud.pieces(numbers=("sigma_Z",), texts=texts):
-        known = np.asarray(np.isfinite(piece.xyz).all(axis=1))
-        xyz.append(piece.xyz[known])
-        sigma.append(piece.numbers.get("sigma_Z", np.full(len(known), np.nan))[known])
+        finite = np.asarray(np.isfinite(piece.xyz).all(axis=1))
+        xyz.append(piece.xyz[finite])
+        sigma.append(piece.numbers.get("sigma_Z", np.full(len(finite), np.nan))[finite])
         for column in piece.texts.values():
-            names += [name for name, good in zip(column, known.tolist(), strict=True) if good]
+            names += [name for name, good in zip(column, finite.tolist(), strict=True) if good]
     return np.concatenate(xyz), np.concatenate(sigma), names, list(cloud.remarks)
 
 

@@ -100,11 +100,11 @@ def read_visibility(path: Path | str, cameras: CameraPositions) -> dict[str, set
     point = Column("point", ("id", "pointid"), kind="text", required=True)
     camera = Column("camera", ("image", "photo"), kind="text", required=True)
     table = read_table(path, (point, camera))
-    seen: dict[str, set[str]] = {}
+    cameras_of: dict[str, set[str]] = {}
     photos = meant(table.texts("camera"), cameras.ids)
     for name, photo in zip(table.texts("point"), photos, strict=True):
-        seen.setdefault(name, set()).add(photo)
-    return seen
+        cameras_of.setdefault(name, set()).add(photo)
+    return cameras_of
 
 
 def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
@@ -123,14 +123,14 @@ def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
     table = read_table(path, (camera, _TIME, level))
     heights = _numbers(table, ("level",))[:, 0]
     if "camera" in table.present:
-        found = dict(zip(meant(table.texts("camera"), cameras.ids), heights.tolist(), strict=True))
-        missing = [name for name in cameras.ids if name not in found]
+        levels = dict(zip(meant(table.texts("camera"), cameras.ids), heights.tolist(), strict=True))
+        missing = [name for name in cameras.ids if name not in levels]
         if missing:
-            like = did_you_mean(missing[0], found)
+            like = did_you_mean(missing[0], levels)
             raise InputError(
                 f"{path}: has no level for photo {missing[0]}{like} ({len(missing)} in all)."
             )
-        return np.array([found[name] for name in cameras.ids])
+        return np.array([levels[name] for name in cameras.ids])
     if "time" not in table.present:
         raise InputError(f"{path}: water levels of photos need a column time or camera.")
     if not any(cameras.times):
@@ -138,15 +138,15 @@ def read_levels(path: Path | str, cameras: CameraPositions) -> FloatArray:
     gauge = np.array([_seconds(text, f"{path}, time") for text in table.texts("time")])
     if len(gauge) < 2 or not (np.diff(gauge) > 0).all():
         raise InputError(f"{path}: needs at least two rows whose times increase.")
-    taken = np.array([_seconds(text, "time of a camera") for text in cameras.times])
-    outside = np.flatnonzero((taken < gauge[0]) | (taken > gauge[-1]))
+    times = np.array([_seconds(text, "time of a camera") for text in cameras.times])
+    outside = np.flatnonzero((times < gauge[0]) | (times > gauge[-1]))
     if outside.size:
         first = outside[0]
         raise InputError(
             f"{path}: photo {cameras.ids[first]} was taken at {cameras.times[first]}, when the "
             f"gauge has no levels ({len(outside)} photos in all). Are both in one time zone?"
         )
-    return np.interp(taken, gauge, heights)
+    return np.interp(times, gauge, heights)
 
 
 def _seconds(text: str, where: str) -> float:

@@ -47,9 +47,9 @@ class VisiblePoints(NamedTuple):
             slope = math.tan(max_angle)
         if visible is None:
             return cls(centres, None, slope)
-        wanted = {(*shape, len(centres)), (math.prod(shape), len(centres))}
+        shapes = {(*shape, len(centres)), (math.prod(shape), len(centres))}
         table: Any = visible if issparse(visible) else np.asarray(visible, dtype=bool)
-        if table.shape not in wanted:
+        if table.shape not in shapes:
             raise InputError(
                 f"visible: expected shape {(*shape, len(centres))} (points, cameras), found "
                 f"{table.shape}."
@@ -83,9 +83,9 @@ class VisiblePoints(NamedTuple):
     def _pairs(self, points: FloatArray, part: slice) -> tuple[IntArray, IntArray]:
         """Return the pairs of some points, sorted by point."""
         if self.table is not None:
-            seen = self.table[part].sorted_indices().tocoo()
-            row, camera = seen.row.astype(np.int64), seen.col.astype(np.int64)
-            row, camera = row[seen.data != 0], camera[seen.data != 0]
+            table = self.table[part].sorted_indices().tocoo()
+            row, camera = table.row.astype(np.int64), table.col.astype(np.int64)
+            row, camera = row[table.data != 0], camera[table.data != 0]
             if self.slope is None:
                 return row, camera
             inside = self._inside(points[row], self.centres[camera])
@@ -102,10 +102,10 @@ class VisiblePoints(NamedTuple):
 
     def _reach(self, points: FloatArray) -> BoolArray:
         """Return which cameras may see anything of the box around some points."""
-        known = points[np.isfinite(points).all(-1)]
-        if not len(known) or self.slope is None:
+        finite = points[np.isfinite(points).all(-1)]
+        if not len(finite) or self.slope is None:
             return np.zeros(len(self.centres), dtype=bool)
-        low, high = known.min(0), known.max(0)
+        low, high = finite.min(0), finite.max(0)
         place = self.centres[:, :2]
         outside = np.maximum(np.maximum(low[:2] - place, place - high[:2]), 0)
         near: BoolArray = np.hypot(*outside.T) <= self.slope * (self.centres[:, 2] - low[2])

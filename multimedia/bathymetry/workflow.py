@@ -154,11 +154,11 @@ def _water(job: Job, cameras: CameraPositions | None, crs: Any = None) -> _Water
         raise InputError(remark("bathymetry.levels_of_photos", of=job.water_level))
     levels = read_levels(job.water_level, cameras)
     mean = float(levels.mean())
-    told = (
+    words = (
         f"The water stood at {levels.min():.3f} to {levels.max():.3f} m while the photos were "
         f"taken; depths count from the mean, {mean:.3f} m."
     )
-    return _Water(Plane.level(mean), levels - mean, (told,))
+    return _Water(Plane.level(mean), levels - mean, (words,))
 
 
 def _corrector(
@@ -325,8 +325,8 @@ def _correct_window(
     while True:
         wide = window.widened(margin)
         given = np.concatenate([dem.positions(wide), dem.heights(wide)[..., None]], axis=-1)
-        known = np.isfinite(given[..., 2])
-        points = given[known]
+        finite = np.isfinite(given[..., 2])
+        points = given[finite]
         result = correct_bathymetry(
             points,
             water_level=water.surface,
@@ -338,8 +338,8 @@ def _correct_window(
         )
         if bounds:
             result = bounds.applied(points, result, bounds.hold(points), job.precision.point)
-        move = np.full((*known.shape, 2), np.nan)
-        move[known] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
+        move = np.full((*finite.shape, 2), np.nan)
+        move[finite] = (result.xyz - points)[:, :2] @ np.linalg.inv(dem.xy_from_pixel[:, :2]).T
         reach = int(np.ceil(np.nanmax(np.abs(move), initial=0.0)))
         needed = reach + 2 if reach else 0
         if needed <= margin or cameras is None:
@@ -350,15 +350,15 @@ def _correct_window(
     layers = [result.xyz[:, 2]]
     if result.sigma is not None:
         layers.append(result.sigma[:, 2])
-    bands = np.full((len(layers), *known.shape), np.nan)
+    bands = np.full((len(layers), *finite.shape), np.nan)
     for band, values in zip(bands, layers, strict=True):
-        band[known] = values
+        band[finite] = values
     if cameras is not None:
         bands = pull_back(bands, move)
     inner = (slice(margin, margin + window.height), slice(margin, margin + window.width))
-    own = np.zeros_like(known)
+    own = np.zeros_like(finite)
     own[inner] = True
-    counted = own[known]
+    counted = own[finite]
     outcome.add(
         points[counted],
         CorrectedPoints(

@@ -77,12 +77,12 @@ def command(options: BoardsCommand) -> None:
     print_result(data, lines, as_json=options.as_json, remarks=notes)
 
 
-def _counts(found: DetectedBoards) -> dict[str, tuple[int, int]]:
+def _counts(boards: DetectedBoards) -> dict[str, tuple[int, int]]:
     """Return boards and points of each camera."""
     return {
         name: (
-            sum(each.camera == name for each in found.views),
-            sum(len(each.view.pixels) for each in found.views if each.camera == name),
+            sum(each.camera == name for each in boards.views),
+            sum(len(each.view.pixels) for each in boards.views if each.camera == name),
         )
-        for name in found.project.camera_names
+        for name in boards.project.camera_names
     }

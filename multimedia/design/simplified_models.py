@@ -233,13 +233,13 @@ def _seen(
     return _Seen(np.asarray(constant * tangent * ratio), np.asarray(whole), tangent)
 
 
-def _judged(seen: _Seen, absorbed: float, distortion: tuple[float, ...] = ()) -> Approximation:
+def _judged(views: _Seen, absorbed: float, distortion: tuple[float, ...] = ()) -> Approximation:
     """Return a model with its errors."""
-    plain = absorbed * seen.tangent
+    plain = absorbed * views.tangent
     predicted = plain * (1 + sum(k * plain ** (2 * i) for i, k in enumerate(distortion, start=1)))
-    error = np.asarray(predicted - seen.image)
+    error = np.asarray(predicted - views.image)
     # An image error seen as a displacement of the point, to first order: the model's own scale
     # there is the slope of its radial distance over R.
     rate = 1 + sum((2 * i + 1) * k * plain ** (2 * i) for i, k in enumerate(distortion, start=1))
-    at_object = np.asarray(error * seen.whole / (absorbed * rate))
+    at_object = np.asarray(error * views.whole / (absorbed * rate))
     return Approximation(absorbed, distortion, error, at_object, float(np.sqrt(np.mean(error**2))))

@@ -92,19 +92,19 @@ def convert(
     check_not_input(target, source)
     if form is not None and target.suffix.lower() == ".toml":
         raise InputError(remark("exchange.project_name", of=target, form=form))
-    wanted = "project" if target.suffix.lower() == ".toml" else form
-    if wanted is None:
-        wanted = _BY_ENDING.get(target.suffix.lower())
-    if wanted is None:
+    format_name = "project" if target.suffix.lower() == ".toml" else form
+    if format_name is None:
+        format_name = _BY_ENDING.get(target.suffix.lower())
+    if format_name is None:
         raise InputError(remark("exchange.name_the_format", of=target, formats=", ".join(FORMATS)))
     kind, project = read_any(source, pitch=pixel_size, unit=unit)
-    if wanted == "project":
+    if format_name == "project":
         write_project(target, project, overwrite=overwrite)
         notes: tuple[str, ...] = ()
     else:
-        notes = _WRITERS[wanted](target, project, overwrite=overwrite)
+        notes = _WRITERS[format_name](target, project, overwrite=overwrite)
     return Conversion(
-        project=project, source=kind, target=wanted, remarks=(*project.remarks, *notes)
+        project=project, source=kind, target=format_name, remarks=(*project.remarks, *notes)
     )
 
 

@@ -49,16 +49,16 @@ class Projection:
     by_interface: FloatArray
 
 
-def as_media(given: Media) -> OpticalMedia:
+def as_media(media: Media) -> OpticalMedia:
     """Return bare layers as an interface whose last face is the plane Z = 0, None as nothing.
 
     Layers of one index are one medium: their faces bend no ray and bound nothing.
     """
-    if given is None:
+    if media is None:
         return StraightRays()
-    if isinstance(given, Layers | FlatInterface) and len(set(given.indices)) == 1:
+    if isinstance(media, Layers | FlatInterface) and len(set(media.indices)) == 1:
         return StraightRays()
-    return FlatInterface(layers=given) if isinstance(given, Layers) else given
+    return FlatInterface(layers=media) if isinstance(media, Layers) else media
 
 
 def project(camera: Camera, points: ArrayLike, media: Media = None) -> FloatArray:

@@ -179,15 +179,15 @@ def bodies_of(
     return tuple(Body(first=first, surfaces=tuple(faces)) for first, faces in groups)
 
 
-def _belong_together(one: RigidSurface, other: RigidSurface) -> bool:
+def _belong_together(first: RigidSurface, second: RigidSurface) -> bool:
     """Return whether two faces are concentric, coaxial or parallel."""
-    if isinstance(one, Sphere) and isinstance(other, Sphere):
-        apart = np.linalg.norm(one.centre - other.centre)
-        return bool(apart <= TOGETHER * max(one.radius, other.radius))
-    if isinstance(one, Plane) and isinstance(other, Plane):
-        return bool(np.linalg.norm(np.cross(one.normal, other.normal)) <= TOGETHER)
-    if isinstance(one, Cylinder) and isinstance(other, Cylinder):
-        between = np.linalg.norm(np.cross(other.point - one.point, one.axis))
-        parallel = np.linalg.norm(np.cross(one.axis, other.axis)) <= TOGETHER
-        return bool(parallel and between <= TOGETHER * max(one.radius, other.radius))
+    if isinstance(first, Sphere) and isinstance(second, Sphere):
+        apart = np.linalg.norm(first.centre - second.centre)
+        return bool(apart <= TOGETHER * max(first.radius, second.radius))
+    if isinstance(first, Plane) and isinstance(second, Plane):
+        return bool(np.linalg.norm(np.cross(first.normal, second.normal)) <= TOGETHER)
+    if isinstance(first, Cylinder) and isinstance(second, Cylinder):
+        between = np.linalg.norm(np.cross(second.point - first.point, first.axis))
+        parallel = np.linalg.norm(np.cross(first.axis, second.axis)) <= TOGETHER
+        return bool(parallel and between <= TOGETHER * max(first.radius, second.radius))
     return False

@@ -117,18 +117,20 @@ def find_particles(
     return particles
 
 
-def _write(out: Path, found: Particles, *, overwrite: bool) -> None:
-    unit, names = found.project.unit, found.project.camera_names
+def _write(out: Path, particles: Particles, *, overwrite: bool) -> None:
+    unit, names = particles.project.unit, particles.project.camera_names
     if out.name.startswith("rt_is"):
         with atomic_path(out, overwrite=overwrite) as temporary:
             factor = METRES[unit] / METRES["mm"]
-            temporary.write_text(rt_is_text(found.xyz * factor, found.numbers), encoding="utf-8")
+            temporary.write_text(
+                rt_is_text(particles.xyz * factor, particles.numbers), encoding="utf-8"
+            )
         return
-    columns: Columns = {"id": [str(k) for k in range(1, len(found.xyz) + 1)]}
-    columns |= {f"{axis} [{unit}]": found.xyz[:, k] for k, axis in enumerate("XYZ")}
+    columns: Columns = {"id": [str(k) for k in range(1, len(particles.xyz) + 1)]}
+    columns |= {f"{axis} [{unit}]": particles.xyz[:, k] for k, axis in enumerate("XYZ")}
     columns |= {
-        f"{name} target": [str(n) if n >= 0 else "" for n in found.numbers[:, k].tolist()]
+        f"{name} target": [str(n) if n >= 0 else "" for n in particles.numbers[:, k].tolist()]
         for k, name in enumerate(names)
     }
-    columns["misfit [px]"] = found.misfit
+    columns["misfit [px]"] = particles.misfit
     write_columns(out, columns, overwrite=overwrite)

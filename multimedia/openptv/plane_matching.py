@@ -221,13 +221,13 @@ def _is_flat(xyz: FloatArray) -> bool:
     return bool(spread[2] < 1e-3 * spread[0])
 
 
-def _rms(found: Resection) -> float:
-    return float(np.sqrt(np.mean(found.residuals**2)))
+def _rms(resection: Resection) -> float:
+    return float(np.sqrt(np.mean(resection.residuals**2)))
 
 
-def _pixels(camera: Camera, found: Resection) -> float:
+def _pixels(camera: Camera, resection: Resection) -> float:
     """Return the RMS misfit of a coordinate. [px]"""
-    return float(np.sqrt(np.mean((found.residuals / _pitch(camera)) ** 2)))
+    return float(np.sqrt(np.mean((resection.residuals / _pitch(camera)) ** 2)))
 
 
 def _pitch(camera: Camera) -> FloatArray:

@@ -180,14 +180,14 @@ def _from_targets(
     if (best >= 0).sum() < 0.5 * len(body.ids):
         clicked = _from_clicks(experiment, k)
         if clicked is not None:
-            said = "started from the points clicked by hand (man_ori)."
-            others += [(clicked, size, said) for size in (least_pixels, 1)]
-    for start, size, said in others:
+            note = "started from the points clicked by hand (man_ori)."
+            others += [(clicked, size, note) for size in (least_pixels, 1)]
+    for start, size, note in others:
         again = matched(start, size)
         # A few more may be noise that happens to lie near; a better start finds many.
         if (again >= 0).sum() > 1.1 * (best >= 0).sum():
             best = again
-            remarks.append(f"{camera.name}: {said}")
+            remarks.append(f"{camera.name}: {note}")
     rows = np.flatnonzero(best >= 0)
     if len(rows) < _FEWEST or _by_chance(project, k, targets, best):
         remarks.append(

@@ -122,14 +122,14 @@ def _mark_depths(axes: Any, curves: Sequence[FloatArray], depths: Sequence[Float
 
 
 def _name_depths(
-    axes: Any, depths: Sequence[float], marks: FloatArray, taken: list[Any], *, level: bool
+    axes: Any, depths: Sequence[float], marks: FloatArray, boxes: list[Any], *, level: bool
 ) -> bool:
     """Name the marks of a curve where a name hides no other one; return whether any is named.
 
     Below the marks of a curve that runs level, else beside them, to the left. The ends come first,
     and lean outwards.
     """
-    before = len(taken)
+    before = len(boxes)
     last = len(marks) - 1
     for k in sorted(range(len(marks)), key=lambda k: k not in (0, last)):
         place = {"xytext": (-8, 0), "ha": "right", "va": "center"}
@@ -142,11 +142,11 @@ def _name_depths(
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0.3}, **place,
         )  # fmt: skip
         box = name.get_window_extent().padded(_ROOM)
-        if any(box.overlaps(earlier) for earlier in taken):
+        if any(box.overlaps(earlier) for earlier in boxes):
             name.remove()
         else:
-            taken.append(box)
-    return len(taken) > before
+            boxes.append(box)
+    return len(boxes) > before
 
 
 def _window(

@@ -82,21 +82,27 @@ def linear_lens(
     return np.ascontiguousarray(np.moveaxis(parts, -3, -1))
 
 
-def quick_pose(camera: Camera, seen: CameraObservations) -> Fit[NetworkState] | None:
+def quick_pose(camera: Camera, observations: CameraObservations) -> Fit[NetworkState] | None:
     """Return the pose that a start leads to; None where the general adjustment has to find it."""
-    layering = layering_of(as_media(seen.media))
-    ideal = camera.ideal(seen.image)
+    layering = layering_of(as_media(observations.media))
+    ideal = camera.ideal(observations.image)
     if layering is None or not np.isfinite(ideal).all():
         return None
     few = len(ideal) < FEW
     fitted = fitted_pose if few and fitted_pose.pays(POSE_SECONDS) else fitted_pose.plain
     # Copies: numba compiles once more for arrays that may not be written.
     centre, rotation = camera.centre.copy(), camera.rotation.copy()
-    points, count = np.ascontiguousarray(seen.points.T), 0
+    points, count = np.ascontiguousarray(observations.points.T), 0
     for _ in range(LENS_ROUNDS):
-        lens = linear_lens(camera, ideal, seen.image, seen.sigma)
+        lens = linear_lens(camera, ideal, observations.image, observations.sigma)
         steps, centre, rotation, flat, rows = fitted(
-            points, lens, centre, rotation, camera.principal_distance, layering, seen.rounding
+            points,
+            lens,
+            centre,
+            rotation,
+            camera.principal_distance,
+            layering,
+            observations.rounding,
         )
         count += steps
         if steps == 0 or not np.isfinite(rows).all():

@@ -175,21 +175,21 @@ def resect(
 
 
 def _fitted(
-    camera: Camera, seen: CameraObservations, names: tuple[str, ...], is_deep: bool
+    camera: Camera, observations: CameraObservations, names: tuple[str, ...], is_deep: bool
 ) -> Fit[NetworkState]:
     """Return the camera of the smallest square sum."""
-    pose = quick_pose(camera, seen)
-    if pose is None or not (is_deep and _is_beyond_doubt(seen, pose)):
-        pose = _best_start(camera, seen, is_deep)
+    pose = quick_pose(camera, observations)
+    if pose is None or not (is_deep and _is_beyond_doubt(observations, pose)):
+        pose = _best_start(camera, observations, is_deep)
     elif names == EXTERIOR:
-        refuse_undetermined(pose, names, seen.what)
+        refuse_undetermined(pose, names, observations.what)
         return pose
-    return seen.network(names).solve(start_at(camera_of(pose.state)))
+    return observations.network(names).solve(start_at(camera_of(pose.state)))
 
 
-def _is_beyond_doubt(seen: CameraObservations, pose: Fit[NetworkState]) -> bool:
+def _is_beyond_doubt(observations: CameraObservations, pose: Fit[NetworkState]) -> bool:
     """Whether a pose fits a body with depth so well that no other can: tiny residuals."""
-    return _cost(pose) < (FITS**2) * float((seen.image**2).sum())
+    return _cost(pose) < (FITS**2) * float((observations.image**2).sum())
 
 
 def _spread(points: FloatArray) -> FloatArray:
@@ -199,21 +199,25 @@ def _spread(points: FloatArray) -> FloatArray:
     return np.sqrt(np.maximum(np.linalg.eigvalsh(away.T @ away), 0.0))
 
 
-def _best_start(camera: Camera, seen: CameraObservations, is_deep: bool) -> Fit[NetworkState]:
+def _best_start(
+    camera: Camera, observations: CameraObservations, is_deep: bool
+) -> Fit[NetworkState]:
     """Return the pose of the smallest square sum that any start leads to."""
     poses: list[Fit[NetworkState]] = []
-    network, count = seen.network(), 1
-    starts = pose_starts(camera, seen.points, seen.image, as_media(seen.media))
+    network, count = observations.network(), 1
+    starts = pose_starts(
+        camera, observations.points, observations.image, as_media(observations.media)
+    )
     for count, start in enumerate(starts, start=2):  # noqa: B007
         try:
             poses.append(network.minimise(start_at(start), most=60, settle=1e-4))
         except GeometryError:  # from there the camera does not see all points
             continue
-        if is_deep and _is_beyond_doubt(seen, poses[-1]):
+        if is_deep and _is_beyond_doubt(observations, poses[-1]):
             break
     if not poses:
         raise ConvergenceError(
-            remark("resect.no_position", of=seen.what),
+            remark("resect.no_position", of=observations.what),
             iterations=count,
             residual=float("nan"),
         )
@@ -278,21 +282,21 @@ def _checked_points(
 
 
 def _refuse_mirrored(
-    camera: Camera, sigma0: float, seen: CameraObservations, is_deep: bool
+    camera: Camera, sigma0: float, observations: CameraObservations, is_deep: bool
 ) -> None:
     """Refuse a bad fit that becomes a good one when the control is mirrored."""
-    size = float(np.sqrt(np.mean(seen.image**2)))
+    size = float(np.sqrt(np.mean(observations.image**2)))
     if not sigma0 > 0.005 * size:
         return
-    normal = as_media(seen.media).mirror_normal(seen.points)
-    offset = (seen.points - seen.points.mean(axis=0)) @ normal
-    mirrored = replace(seen, points=seen.points - 2.0 * offset[:, None] * normal)
+    normal = as_media(observations.media).mirror_normal(observations.points)
+    offset = (observations.points - observations.points.mean(axis=0)) @ normal
+    mirrored = replace(observations, points=observations.points - 2.0 * offset[:, None] * normal)
     try:
         mirror = _best_start(camera, mirrored, is_deep)
     except ConvergenceError:
         return
     if mirror.sigma0 < 0.2 * sigma0:
-        raise GeometryError(remark("resect.mirrored", of=seen.what))
+        raise GeometryError(remark("resect.mirrored", of=observations.what))
 
 
 def _refuse_flat(camera: Camera, names: tuple[str, ...], covariance: FloatArray, what: str) -> None:

@@ -164,14 +164,14 @@ def _text(targets: TargetImages, offset: float) -> str:
     )
 
 
-def _columns(made: Sequence[ImageTargets]) -> Columns:
+def _columns(images: Sequence[ImageTargets]) -> Columns:
     def joined(name: str, axis: int | None = None) -> Any:
-        parts = [getattr(one.targets, name) for one in made]
+        parts = [getattr(one.targets, name) for one in images]
         return np.concatenate([part if axis is None else part[:, axis] for part in parts])
 
     return {
-        "image": [one.image.name for one in made for _ in range(len(one.targets))],
-        "id": [str(k + 1) for one in made for k in range(len(one.targets))],
+        "image": [one.image.name for one in images for _ in range(len(one.targets))],
+        "id": [str(k + 1) for one in images for k in range(len(one.targets))],
         "column [px]": joined("pixels", 0),
         "row [px]": joined("pixels", 1),
         "sigma_column [px]": joined("sigma", 0),
@@ -180,19 +180,19 @@ def _columns(made: Sequence[ImageTargets]) -> Columns:
         "height": joined("height"),
         "sum": joined("sums"),
         "pixels": joined("counts").astype(float),
-        "merged": ["yes" if flag else "" for one in made for flag in one.targets.merged],
+        "merged": ["yes" if flag else "" for one in images for flag in one.targets.merged],
     }
 
 
-def _remarks(made: Sequence[ImageTargets], largest: float) -> list[str]:
+def _remarks(images: Sequence[ImageTargets], largest: float) -> list[str]:
     notes: list[str] = [
-        remark("targets.none", of=one.image) for one in made if not len(one.targets)
+        remark("targets.none", of=one.image) for one in images if not len(one.targets)
     ]
-    merged = sum(int(one.targets.merged.sum()) for one in made)
-    count = sum(len(one.targets) for one in made)
+    merged = sum(int(one.targets.merged.sum()) for one in images)
+    count = sum(len(one.targets) for one in images)
     if merged > _MANY * count:
         notes.append(remark("targets.merged", merged=merged, count=count))
-    sizes = np.concatenate([one.targets.diameter for one in made])
+    sizes = np.concatenate([one.targets.diameter for one in images])
     if len(sizes) and np.median(sizes) > _LARGE * largest:
         notes.append(remark("targets.large", largest=largest))
     return notes

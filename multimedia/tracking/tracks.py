@@ -174,8 +174,11 @@ def track_particles(
         previous = linked(clouds, rules)
         order, track = in_tracks(previous, shortest)
         frame, xyz, covariance = names_of[order], np.concatenate(clouds)[order], covariance[order]
-        velocity, own = track_velocities(xyz, covariance, frame / rate, track)
-        precision, moments = np.nan_to_num(own), [np.flatnonzero(frame == n) for n in names]
+        velocity, velocity_covariance = track_velocities(xyz, covariance, frame / rate, track)
+        precision, moments = (
+            np.nan_to_num(velocity_covariance),
+            [np.flatnonzero(frame == n) for n in names],
+        )
         differ = pool.map(
             lambda now: differs_from_neighbours(xyz[now], velocity[now], precision[now]), moments
         )
@@ -187,6 +190,6 @@ def track_particles(
         raise InputError(remark("tracks.chance", points=len(order), chance=chance, step=rules.step))
     return Tracks(
         track=track, frame=frame, number=number[order], xyz=xyz, covariance=covariance,
-        velocity=velocity, velocity_covariance=own, outlier=outlier, step=rules.step,
-        change=rules.change, drift=np.array(rules.drift), particles=len(previous), by_chance=chance,
+        velocity=velocity, velocity_covariance=velocity_covariance, outlier=outlier,
+        step=rules.step, change=rules.change, drift=np.array(rules.drift), particles=len(previous), by_chance=chance,
     )  # fmt: skip

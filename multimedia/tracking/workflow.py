@@ -246,13 +246,13 @@ def _frames(
     first: int | None, last: int | None,
 ) -> range:  # fmt: skip
     """Return the frames in a row that all cameras have, or all but a few of them."""
-    seen = [set(sequence) for sequence in sequences]
-    common = sorted(set.intersection(*seen))
+    frames = [set(sequence) for sequence in sequences]
+    common = sorted(set.intersection(*frames))
     chosen = [n for n in common if (first is None or n >= first) and (last is None or n <= last)]
     begin = first if first is not None else (chosen or [0])[0]
     end = last if last is not None else (chosen or [0])[-1]
     # The first that is missing, without a list of all numbers up to --last.
-    here = {n for n in set.union(*seen) if sum(n in numbers for numbers in seen) >= 2}
+    here = {n for n in set.union(*frames) if sum(n in numbers for numbers in frames) >= 2}
     missing = next((n for n in range(begin, end + 1) if n not in here), None)
     if missing is not None or len(chosen) < 3:
         lack = "too few" if missing is None else f"frame {missing} is not there of every camera"
@@ -309,9 +309,11 @@ def _particles(
     cameras, media = content.cameras, content.interfaces
     _, numbers, _ = correspondences(cameras, places, media, tolerance=tolerance, fewest=fewest)
     image = np.full((len(cameras), len(numbers), 2), np.nan)
-    for k, (camera, seen) in enumerate(zip(cameras, places, strict=True)):
-        own = numbers[:, k] >= 0
-        image[k, own] = camera.described_sensor().image_from_pixel(seen[numbers[own, k]])
+    for k, (camera, positions) in enumerate(zip(cameras, places, strict=True)):
+        visible = numbers[:, k] >= 0
+        image[k, visible] = camera.described_sensor().image_from_pixel(
+            positions[numbers[visible, k]]
+        )
     points = intersect(cameras, image, list(media))
     good = np.isfinite(points.xyz).all(axis=1)
     rays = points.rays[good]

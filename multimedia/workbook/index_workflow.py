@@ -122,9 +122,9 @@ def find_from_index(
         If no temperature, or no possible salinity, gives the index.
     """
     key, unit, solve, low, high = _UNKNOWNS[what]
-    given = {name: value for name, value in water.items() if name != key}
+    rest = {name: value for name, value in water.items() if name != key}
     chosen = WATER_FORMULAS[formula]
-    value = float(solve(index, **given, formula=chosen))
+    value = float(solve(index, **rest, formula=chosen))
     if not low <= value <= high:
         raise GeometryError(
             remark(
@@ -134,8 +134,8 @@ def find_from_index(
             else remark("shift.no_temperature", salinity=water["salinity_percent"], index=index)
         )
     everything = water | {key: max(value, 0.0) if what == "salinity" else value}
-    known = {name: sigma for name, sigma in sigmas.items() if name != f"sigma_{key}"}
-    sigma_others = float(water_index_sigma(**everything, **known, formula=chosen))
+    sigmas_of_rest = {name: sigma for name, sigma in sigmas.items() if name != f"sigma_{key}"}
+    sigma_others = float(water_index_sigma(**everything, **sigmas_of_rest, formula=chosen))
     slope = getattr(water_index_derivatives(**everything, formula=chosen), f"d_{what}")
     return WaterAnswer(
         key=key,
@@ -143,7 +143,7 @@ def find_from_index(
         unit=unit,
         value=value,
         sigma=hypot(sigma_index, sigma_others) / abs(float(slope)),
-        conditions={"refractive_index": index, **given},
+        conditions={"refractive_index": index, **rest},
         formula=chosen,
         remarks=chosen.remarks(**everything),
     )

@@ -133,7 +133,7 @@ def read_shift_input(
     return ShiftInput(table=table, setup=setup, places=values.places)
 
 
-def _settle_names(book: SheetFile | CsvFile, wanted: Collection[str]) -> list[str]:
+def _settle_names(book: SheetFile | CsvFile, names: Collection[str]) -> list[str]:
     """Leave of a workbook's names those of camera and media; return which the user's own are.
 
     In a workbook of the user's own they are the cells of the sheet that we put there, by their
@@ -150,7 +150,7 @@ def _settle_names(book: SheetFile | CsvFile, wanted: Collection[str]) -> list[st
         book.names.clear()
         book.names.update({key.casefold(): (title, row, column) for key, row in labels.items()})
         return []
-    places = {key: book.names[key.casefold()] for key in wanted if key.casefold() in book.names}
+    places = {key: book.names[key.casefold()] for key in names if key.casefold() in book.names}
     values = {
         key: book.grid(sheet).rows.get(row, {}).get(column)
         for key, (sheet, row, column) in sorted(places.items())
@@ -161,9 +161,9 @@ def _settle_names(book: SheetFile | CsvFile, wanted: Collection[str]) -> list[st
     if len(numbers.keys() & {"n_1", "n_2", "z_0"}) < 2:
         return []
     book.names.update({key.casefold(): places[key] for key in numbers})
-    told = (f"{k} = {v:.15g} ({places[k][0]}!{cell_name(*places[k][1:])})"
+    readings = (f"{k} = {v:.15g} ({places[k][0]}!{cell_name(*places[k][1:])})"
             for k, v in numbers.items())  # fmt: skip
-    return [remark("table.beside_names", values=", ".join(told))]
+    return [remark("table.beside_names", values=", ".join(readings))]
 
 
 def _refuse_survey(book: SheetFile | CsvFile) -> None:

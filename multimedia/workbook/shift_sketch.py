@@ -13,9 +13,9 @@ _LEFT, _CAMERA, _UPPER, _LOWER, _DEPTH = 70.0, 20.0, 130.0, 150.0, 240.0
 _MEETS, _LEAVES, _POINT = 82.5, 90.0, 135.0
 
 
-def shift_sketch(told: str) -> Sketch:
-    """Return the drawing; ``told`` says in words what is to be seen."""
-    sketch = Sketch(size=_SIZE, told=told)
+def shift_sketch(caption: str) -> Sketch:
+    """Return the drawing; ``caption`` says in words what is to be seen."""
+    sketch = Sketch(size=_SIZE, told=caption)
     straight = _MEETS / (_UPPER - _CAMERA) * (_DEPTH - _CAMERA)
     for level, width in ((_UPPER, 1.5), (_LOWER, 1.5)):
         sketch.line((20, level), (_SIZE[0] - 5, level), _WATER, width=width)

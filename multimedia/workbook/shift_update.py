@@ -127,7 +127,7 @@ def _store_chart(
 def add_columns(
     path: Path | str,
     out: Path,
-    given: ShiftInput,
+    source: ShiftInput,
     rows: Sequence[int],
     setup: ShiftSetup,
     points: ShiftPoints,
@@ -145,7 +145,7 @@ def add_columns(
     ----------
     path, out, rows, setup, points, overwrite
         As in `update_template`.
-    given : ShiftInput
+    source : ShiftInput
         What was read from the workbook.
 
     Returns
@@ -158,14 +158,14 @@ def add_columns(
     InputError
         If the sheet of the media is for another number of them, or the file cannot be written.
     """
-    editor, table = WorkbookEditor(Path(path)), given.table
-    media = _media_sheet(editor, given, setup)
+    editor, table = WorkbookEditor(Path(path)), source.table
+    media = _media_sheet(editor, source, setup)
     make_numbers(editor, table, lambda _: 1.0)
     count = len(setup.layers.indices)
     places = media_places(count)
 
     grid = editor.grid(table.sheet).rows
-    own = OwnTable(
+    users_table = OwnTable(
         sheet=table.sheet,
         head=head_row(grid, table.columns, table.headings, table.rows[0]),
         rows=[table.rows[row] for row in rows],
@@ -187,11 +187,11 @@ def add_columns(
         if column.formula
     ]  # fmt: skip
     columns.sort(key=lambda column: column.key not in ADDED)
-    put_result_columns(editor, own, columns, mark=MARK, adopted=ADDED)
+    put_result_columns(editor, users_table, columns, mark=MARK, adopted=ADDED)
     return editor.save(out, overwrite=overwrite)
 
 
-def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -> str:
+def _media_sheet(editor: WorkbookEditor, source: ShiftInput, setup: ShiftSetup) -> str:
     """Return the title of the sheet of camera and media, made or brought up to date."""
     place = place_of(editor, MEDIA)
     values = _named(setup)
@@ -209,7 +209,7 @@ def _media_sheet(editor: WorkbookEditor, given: ShiftInput, setup: ShiftSetup) -
         _store_ratios(editor, setup, places)
         return title
     links = {}
-    for name, (sheet, cell) in given.places.items():
+    for name, (sheet, cell) in source.places.items():
         own = (sheet, *split_cell(cell))
         if name in values and editor.value_at(*own) == values[name]:
             links[name] = _reference(*own)

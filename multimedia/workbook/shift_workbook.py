@@ -93,7 +93,7 @@ def write_shift_workbook(
     count = max(rows, len(points.ids) if points else 0)
     if not 1 <= count <= MOST_ROWS:
         raise InputError(remark("shift.rows", of=path, count=count, most=MOST_ROWS))
-    check_new_workbook(path, overwrite=overwrite, other="" if points is None else "-result")
+    check_new_workbook(path, overwrite=overwrite, suffix="" if points is None else "-result")
     book = BookBuilder(language=language, words=WORDS)
     book.book.properties.creator = book.book.properties.title = "multimedia"
     lines = [line for line in WORDS.readme(language) if line]

@@ -120,17 +120,17 @@ def _svg(block: Picture) -> str:
     return re.sub(r'"data:image/png;base64,([^"]+)"', _smaller, buffer.getvalue())
 
 
-def _smaller(found: re.Match[str]) -> str:
+def _smaller(match: re.Match[str]) -> str:
     """Return a picture inside a figure as JPEG where that loses nothing that is transparent."""
     from PIL import Image
 
-    data = base64.b64decode(found[1])
+    data = base64.b64decode(match[1])
     with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
         picture: Any = image.convert("RGBA")
     if picture.getextrema()[3][0] < 255 or len(data) < 50_000:
-        return found[0]
+        return match[0]
     out = io.BytesIO()
     picture.convert("RGB").save(out, "JPEG", quality=JPEG)
     if out.tell() >= len(data):
-        return found[0]
+        return match[0]
     return f'"data:image/jpeg;base64,{base64.b64encode(out.getvalue()).decode("ascii")}"'

@@ -68,9 +68,9 @@ def numbers(
     result = np.full(len(values), np.nan)
     texts: dict[int, NumberText] = {}
     unfinished: list[int] = []
-    wanted = unit or column.unit
+    target = unit or column.unit
     # What has a unit was measured; other columns of foreign tables hold what they like.
-    largest = LARGEST if wanted else sys.float_info.max
+    largest = LARGEST if target else sys.float_info.max
     for index, value in enumerate(values):
         if isinstance(value, float):
             result[index] = value
@@ -83,24 +83,24 @@ def numbers(
             if part is not None:
                 texts[index] = part
             elif value.strip():
-                complain(index, _not_a_number(value, wanted))
+                complain(index, _not_a_number(value, target))
         elif isinstance(value, NotCalculated):
             unfinished.append(index)
         else:
-            complain(index, _wrong_type(value, wanted))
+            complain(index, _wrong_type(value, target))
     if unfinished:
         more = f" (and {len(unfinished) - 1} more in this column)" if len(unfinished) > 1 else ""
         complain(unfinished[0], _not_calculated(more))
-    common_unit = _typed_unit(texts, wanted, complain, has_bare=bool(np.isfinite(result).any()))
+    common_unit = _typed_unit(texts, target, complain, has_bare=bool(np.isfinite(result).any()))
     _read_texts(result, texts, decimal, elsewhere, complain, largest)
     typed = sum(bool(part.unit) for part in texts.values())
-    told: list[str] = (
+    written: list[str] = (
         [remark("table.unit_taken_off", column=column.key, count=typed)] if typed else []
     )
     if column.kind == "integer":
         for broken in np.flatnonzero(np.isfinite(result) & (result != np.floor(result))):
             complain(int(broken), f"found {result[broken]:.15g}, expected a whole number.")
-    return result, common_unit or unit, told
+    return result, common_unit or unit, written
 
 
 def flags(values: Sequence[Value | None], complain: Complain) -> FloatArray:
@@ -176,7 +176,7 @@ def _read_texts(
 
 
 def _typed_unit(
-    parts: dict[int, NumberText], wanted: str, complain: Complain, *, has_bare: bool
+    parts: dict[int, NumberText], target: str, complain: Complain, *, has_bare: bool
 ) -> str:
     """Check the units typed into cells; return the one all have where the heading says none.
 
@@ -186,7 +186,7 @@ def _typed_unit(
     symbols = {index: unit_symbol(part.unit) for index, part in parts.items() if part.unit}
     if not symbols:
         return ""
-    if not wanted and "" not in symbols.values():
+    if not target and "" not in symbols.values():
         has_bare |= len(symbols) < len(parts)
         if len(set(symbols.values())) == 1 and not has_bare:
             return next(iter(symbols.values()))
@@ -200,19 +200,19 @@ def _typed_unit(
         return common
     for index, symbol in symbols.items():
         part = parts[index]
-        if symbol and symbol == wanted:
+        if symbol and symbol == target:
             continue
         shown = f"{part.digits} {part.unit}"
-        if part.unit.casefold() in GRAD and wanted in ("deg", "gon", "rad"):
+        if part.unit.casefold() in GRAD and target in ("deg", "gon", "rad"):
             complain(index, remark("table.which_grad", found=_short(shown)))
             del parts[index]
             continue
         value = part.value("comma" if "," in part.digits else "point")
-        number = converted(value, symbol, wanted) if value is not None and symbol else value
+        number = converted(value, symbol, target) if value is not None and symbol else value
         advice = f"Write {number:.15g}; the" if number is not None else "The"
         complain(
             index,
-            f'found "{_short(shown)}", expected a number{wanted and f" in {wanted}"}. '
+            f'found "{_short(shown)}", expected a number{target and f" in {target}"}. '
             f"{advice} unit belongs in the heading.",
         )
         del parts[index]
@@ -233,13 +233,13 @@ def _unlike_units(parts: dict[int, NumberText], symbols: dict[int, str], *, has_
 
 
 def _mixed(part: NumberText, agreed: Decimal) -> str:
-    other: Decimal = "point" if agreed == "comma" else "comma"
-    value = part.value(other)
+    opposite: Decimal = "point" if agreed == "comma" else "comma"
+    value = part.value(opposite)
     if value is None:
         return f'found "{_short(part.digits)}", expected a number.'
     better = f"{value:.15g}".replace(".", "," if agreed == "comma" else ".")
     words = remark("table.other_decimal", found=_short(part.digits), agreed=agreed)
-    return f"{words} {advice('mixed', '--decimal', better=better, other=other)}"
+    return f"{words} {advice('mixed', '--decimal', better=better, other=opposite)}"
 
 
 def _not_a_number(text: str, unit: str) -> str:

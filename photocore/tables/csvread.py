@@ -148,9 +148,9 @@ def find_in_text(
     _, grid, match, delimiter = best
     missing = match.missing(columns) if match else []
     if match is None or missing:
-        wanted = missing or [c.key for c in columns if c.required] or [c.key for c in columns]
+        needed = missing or [c.key for c in columns if c.required] or [c.key for c in columns]
         shown = describe(grid, match)
-        about = {"missing": ", ".join(wanted), "headings": shown or "absent"}
+        about = {"missing": ", ".join(needed), "headings": shown or "absent"}
         first = next((record for record in file.records(delimiter, sample=True) if record), [])
         if sum(take_apart(field) is not None for field in first) > 2:
             text = remark("table.no_headings", of=file.label, row=" ".join(first[:6]))
@@ -249,17 +249,17 @@ def plain_rows(
     if last < match.first or is_summary({1: texts.get("id", [""])[-1]}, 1):
         return None
     for key in quick:
-        elsewhere = set[str]().union(*(proven[other] for other in quick if other != key))
+        elsewhere = set[str]().union(*(proven[rival] for rival in quick if rival != key))
         if not is_clear(proven[key], elsewhere, decimal):
             careful |= {key}
     if not careful.isdisjoint(quick):
         return plain_rows(file, delimiter, width, match, columns, decimal, careful=careful)
-    known: tuple[Decimal, ...] = ("point", "comma")
+    marks: tuple[Decimal, ...] = ("point", "comma")
     return PlainRows(
         range(match.first, last + 1),
         {key: np.concatenate(arrays) for key, arrays in chunks.items()},
         texts,
-        {key: {mark for mark in known if mark in proven[key]} for key in quick},
+        {key: {mark for mark in marks if mark in proven[key]} for key in quick},
     )
 
 

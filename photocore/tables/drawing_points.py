@@ -84,12 +84,12 @@ def _named(
         for j, (_, place) in enumerate(texts)
     )
     names: dict[int, int] = {}
-    taken: set[int] = set()
+    used: set[int] = set()
     for distance, i, j in couples:
-        if i not in names and j not in taken:
+        if i not in names and j not in used:
             if len(points) > 1 and distance > _NEAR * size:
                 x, y = points[i][:2]
                 raise InputError(f"{path}: the point at {x:g}, {y:g} has no name beside it.")
             names[i] = j
-            taken.add(j)
+            used.add(j)
     return [(texts[names[i]][0], point) for i, point in enumerate(points)]

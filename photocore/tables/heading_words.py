@@ -76,12 +76,12 @@ def unknown_unit(text: str) -> str:
     >>> unknown_unit("X (east)"), unknown_unit("scale [1]")
     ('', '')
     """
-    said = _UNIT.search(text)
-    if said is None:
+    match = _UNIT.search(text)
+    if match is None:
         return ""
-    word = _DATUM.sub("", said[1]).strip(" .")
+    word = _DATUM.sub("", match[1]).strip(" .")
     base = _POWER.sub("", word).casefold()
-    if said[0].lstrip().startswith("("):
+    if match[0].lstrip().startswith("("):
         return word if base in _FOREIGN else ""
     return "" if not word or base in UNITS or base in _NO_LENGTHS else word
 

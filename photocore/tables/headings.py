@@ -111,23 +111,23 @@ def find_columns(
         The only columns that count (those of a named table).
     """
     candidates = sorted(grid.rows)[:_SEARCHED]
-    fixed, wanted = _apply_map(grid, columns, column_map, candidates)
-    if fixed and len(fixed) == len(wanted):
+    fixed, mapped = _apply_map(grid, columns, column_map, candidates)
+    if fixed and len(fixed) == len(mapped):
         return _without_heading(grid, columns, fixed, candidates)
     if rows:
         candidates = [row for row in candidates if rows[0] <= row <= rows[1]]
     best: Match | None = None
-    words = {word for c in wanted for word in (c.key, bare(c.key), *map(bare, c.aliases))}
+    words = {word for c in mapped for word in (c.key, bare(c.key), *map(bare, c.aliases))}
     for row in candidates:
         for texts, header in _heading_texts(grid, row, span):
             if words.isdisjoint(_words_of(texts)):
                 continue  # most rows: they hold values
-            match = _assign(wanted, texts, fixed, header, column_map or {})
+            match = _assign(mapped, texts, fixed, header, column_map or {})
             match.score = (*match.score[:2], int(header == row))
             if match.score[0] > len(fixed) and (best is None or match.score > best.score):
                 best = match
     if best is not None and "id" not in (column_map or {}):
-        _take_names(grid, best, wanted, span or (1, 10**6))
+        _take_names(grid, best, mapped, span or (1, 10**6))
     if best is not None:
         best.remarks += _assumed_order(grid, best, span)
     return best
@@ -141,13 +141,13 @@ def _assumed_order(grid: CellGrid, match: Match, span: tuple[int, int] | None) -
     for key in ("x", "col", "s"):
         places = [match.columns.get(f"{key}{k}", 0) for k in "12"]
         lower = [str(grid.rows[match.header].get(place, "")).strip() for place in places if texts]
-        if len({bare(own) for own in lower}) != 1:
+        if len({bare(head) for head in lower}) != 1:
             continue  # these tell the photos apart themselves
         whole = [texts.get(place, [""])[0] for place in places]
         above = [
-            f'"{text.removesuffix(own).strip()}"'
-            for text, own in zip(whole, lower, strict=True)
-            if text.endswith(f" {own}")
+            f'"{text.removesuffix(head).strip()}"'
+            for text, head in zip(whole, lower, strict=True)
+            if text.endswith(f" {head}")
         ]
         if len(set(above)) == 2:
             return [remark("table.first_is_far", first=above[0], second=above[1])]
@@ -170,7 +170,7 @@ def _apply_map(
         if isinstance(value, str)
     }
     fixed: dict[str, int] = {}
-    wanted = []
+    pairs = []
     for column in columns:
         place = column_map.get(column.key, "").strip()
         if not place:
@@ -179,13 +179,13 @@ def _apply_map(
             fixed[column.key] = column_number(place)
         elif place not in texts and place.isdecimal():
             fixed[column.key] = int(place)
-        wanted.append(Column(column.key, (place,), column.kind, column.required, column.unit))
-    mapped = {column.key for column in wanted}
+        pairs.append(Column(column.key, (place,), column.kind, column.required, column.unit))
+    mapped = {column.key for column in pairs}
     complete = all(column.key in mapped for column in columns if column.required)
-    if len(fixed) == len(wanted) and complete:
-        return fixed, wanted
+    if len(fixed) == len(pairs) and complete:
+        return fixed, pairs
     # With headings to go by, columns that the map does not name are found as usual.
-    return fixed, wanted + [column for column in columns if column.key not in mapped]
+    return fixed, pairs + [column for column in columns if column.key not in mapped]
 
 
 def _heading_texts(
@@ -215,10 +215,10 @@ def _heading_texts(
         double: dict[int, list[str]] = {}
         digits = _photo_digits([groups.get(column, "") for column in sorted(lower)])
         for column in sorted(set(lower) | set(single)):
-            group, own = groups.get(column, ""), lower.get(column, "")
-            if own:
-                titled = [numbered(own, digits[group])] if group in digits else []
-                double[column] = [*titled, f"{group} {own}".strip(), own]
+            group, text = groups.get(column, ""), lower.get(column, "")
+            if text:
+                titled = [numbered(text, digits[group])] if group in digits else []
+                double[column] = [*titled, f"{group} {text}".strip(), text]
             else:
                 double[column] = [upper[column]]
         headings.append((double, row + 1))
@@ -277,7 +277,7 @@ def _assign(
 ) -> Match:
     """Give each column asked for a heading: as the user says, by key, then by alias in order."""
     match = Match(columns=dict(fixed), first=header + 1, header=header)
-    taken: dict[int, str] = {number: key for key, number in fixed.items()}
+    key_of: dict[int, str] = {number: key for key, number in fixed.items()}
     forms = {number: forms_of(variants) for number, variants in texts.items()}
     # "X/Easting" is X as well as Easting, and "Höhe NHN" a height, where nothing else is.
     parts = {number: parts_of(variants[-1]) for number, variants in texts.items()}
@@ -285,7 +285,7 @@ def _assign(
     aliases = {column.key: {bare(alias) for alias in column.aliases} for column in columns}
 
     def take(column: Column, number: int) -> None:
-        match.columns[column.key], taken[number] = number, column.key
+        match.columns[column.key], key_of[number] = number, column.key
         shown = texts[number][0].strip()
         match.headings[column.key] = shown
         unit = next((u for u in map(unit_of, texts[number]) if u), "")
@@ -298,13 +298,15 @@ def _assign(
         shared = not is_whole and not parts[number].isdisjoint(parts[rival])
         return shared or forms[rival][0] == forms[number][0]
 
-    said = [column for column in columns if column.key in mapped and column.key not in fixed]
-    for column in said:
+    mapped_columns = [
+        column for column in columns if column.key in mapped and column.key not in fixed
+    ]
+    for column in mapped_columns:
         place = column.aliases[0]
-        fitting = [n for n in sorted(texts) if n not in taken and bare(place) in forms[n]]
+        fitting = [n for n in sorted(texts) if n not in key_of and bare(place) in forms[n]]
         if fitting:
             take(column, min(fitting, key=lambda n: place not in map(str.strip, texts[n])))
-    others = [column for column in columns if column not in said]
+    others = [column for column in columns if column not in mapped_columns]
     by_column = [(column, number) for column in others for number in sorted(texts)]
     by_number = [(column, number) for number in sorted(texts) for column in others]
     ways: tuple[tuple[list[tuple[Column, int]], Callable[[str, int], bool]], ...] = (
@@ -319,7 +321,7 @@ def _assign(
     matched = [len(match.columns)]
     for pairs, fits in ways:
         for column, number in pairs:
-            is_free = column.key not in match.columns and number not in taken
+            is_free = column.key not in match.columns and number not in key_of
             if is_free and fits(column.key, number):
                 take(column, number)
         matched.append(len(match.columns))
@@ -327,9 +329,9 @@ def _assign(
         number = match.columns.get(column.key, 0)
         if number in texts and column.key not in fixed:
             same = [
-                other
-                for other in sorted(texts)
-                if other == number or (other not in taken and alike(column.key, number, other))
+                text
+                for text in sorted(texts)
+                if text == number or (text not in key_of and alike(column.key, number, text))
             ]
             if len(same) > 1:
                 match.doubles[column.key] = same
@@ -355,7 +357,7 @@ def _take_names(
     filled = sum(number in grid.rows[row] for row in below if row <= match.header + 50)
     count = sum(row <= match.header + 50 for row in below)
     if number > 0 and filled > count / 2 and number not in heads:
-        said = remark("table.unnamed_column", column=column_letters(number))
+        note = remark("table.unnamed_column", column=column_letters(number))
     else:
         kinds = {column.key: column.kind for column in columns}
         measured = [n for key, n in match.columns.items() if kinds[key] in ("number", "integer")]
@@ -369,14 +371,16 @@ def _take_names(
         free = (n for n in places if n not in (*used, *north))
         number = next((n for n in free if _are_names(heads.get(n, ""), n, data)), 0)
         about = {"heading": heads.get(number, ""), "column": column_letters(number)}
-        said = match.guessed = remark("table.guessed_names", **about)
+        note = match.guessed = remark("table.guessed_names", **about)
     if number:
         match.columns[name.key] = number
         match.headings[name.key] = str(heads.get(number, ""))
-        match.remarks.append(said)
+        match.remarks.append(note)
         # "N." of points beside "N" of the north.
-        others = {key: [n for n in own if n != number] for key, own in match.doubles.items()}
-        match.doubles = {key: own for key, own in others.items() if len(own) > 1}
+        others = {
+            key: [n for n in numbers if n != number] for key, numbers in match.doubles.items()
+        }
+        match.doubles = {key: numbers for key, numbers in others.items() if len(numbers) > 1}
 
 
 def _is_measured(cells: Mapping[int, Value], measured: Sequence[int]) -> bool:

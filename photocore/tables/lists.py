@@ -92,10 +92,10 @@ def as_table(text: str, label: str) -> tuple[str, list[str]]:
         (start.startswith("{"), _of_geojson),
     )
     for fits, read in lists:
-        made = read(text, label) if fits else None
-        if made is not None:
-            notes = remark("table.list_of", program=made.program)
-            return made.as_text(), [notes, *made.remarks]
+        table = read(text, label) if fits else None
+        if table is not None:
+            notes = remark("table.list_of", program=table.program)
+            return table.as_text(), [notes, *table.remarks]
     return _in_its_unit(_with_commas_as_tabs(text), label), []
 
 
@@ -160,15 +160,15 @@ def _of_qgis(text: str, label: str) -> ListRows | None:
     if head is None:
         return None
     kind = "pixel" if "pixelX" in table[head] else "source"
-    wanted = ("mapX", "mapY", f"{kind}X", f"{kind}Y")
-    if not {*wanted} <= {*table[head]}:
+    headings = ("mapX", "mapY", f"{kind}X", f"{kind}Y")
+    if not {*headings} <= {*table[head]}:
         return None
     system = _SYSTEM.match(text)
     axes = _headed("XY", unit_of_system(system[1] if head and system else "", label))
     rows: list[Sequence[object]] = [()] * head
     for fields in table[head + 1 :]:
         held = dict(zip(table[head], fields, strict=False))
-        numbers = [held.get(key, "").strip() for key in wanted]
+        numbers = [held.get(key, "").strip() for key in headings]
         if not all(map(_is_number, numbers)):
             rows.append(())
             continue
@@ -176,10 +176,10 @@ def _of_qgis(text: str, label: str) -> ListRows | None:
         if row < -1:
             raise InputError(remark("table.qgis_placed", of=label))
         rows.append((*numbers[:2], f"{column:.10g}", f"{row:.10g}", held.get("enable", "") or "1"))
-    made: list[Sequence[object]] = [
+    records: list[Sequence[object]] = [
         () if not row else (f"{k}", *row) for k, row in enumerate(rows, start=1 - head)
     ]
-    return ListRows(("id", *axes, "col", "row", "use"), made, "QGIS")
+    return ListRows(("id", *axes, "col", "row", "use"), records, "QGIS")
 
 
 def _of_metashape(text: str, label: str) -> ListRows | None:

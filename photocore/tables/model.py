@@ -142,8 +142,8 @@ class Table:
         errors = []
         for row, text in enumerate(self.texts(key)):
             if text and first.setdefault(text, row) != row:
-                other = self.cell(first[text], key)
-                message = f'"{text}" stands in {other} already; give each point its own name.'
+                earlier = self.cell(first[text], key)
+                message = f'"{text}" stands in {earlier} already; give each point its own name.'
                 errors.append(self.error(row, key, message))
         return errors
 
@@ -204,16 +204,16 @@ class Table:
         errors : list
             Takes the complaint.
         """
-        wanted = next(iter(factors))
-        symbol = self.units.get(key) or wanted
+        target = next(iter(factors))
+        symbol = self.units.get(key) or target
         if symbol not in factors:
-            errors.append(self.unit_error(key, symbol, wanted))
+            errors.append(self.unit_error(key, symbol, target))
         return self.numbers(key) * factors.get(symbol, 1.0)
 
-    def unit_error(self, key: str, symbol: str, wanted: str) -> CellError:
+    def unit_error(self, key: str, symbol: str, target: str) -> CellError:
         """Return the complaint about a heading with another unit than expected."""
         message = (
-            f'the heading "{self.headings.get(key, key)}" says [{symbol}], expected [{wanted}].'
+            f'the heading "{self.headings.get(key, key)}" says [{symbol}], expected [{target}].'
         )
         return CellError(message, file=self.file, sheet=self.sheet, column=key)
 
@@ -322,7 +322,7 @@ def parse_column_map(text: str, keys: Sequence[str] = ()) -> dict[str, str]:
 def _known(key: str, keys: Sequence[str]) -> str:
     if not keys or key in keys:
         return key
-    alike = [known for known in keys if known.casefold() == key.casefold()]
+    alike = [name for name in keys if name.casefold() == key.casefold()]
     if len(alike) == 1:
         return alike[0]
     raise InputError(f'--columns: there is no column "{key}"; known are {", ".join(keys)}.')

@@ -31,7 +31,7 @@ def read_named_values(
     decimal: Decimal | None = None,
     errors: list[CellError] | None = None,
     several: bool = False,
-    given: Collection[str] = (),
+    options: Collection[str] = (),
 ) -> NamedValues:
     """Read single values: by defined name, else the value to the right of a label.
 
@@ -48,7 +48,7 @@ def read_named_values(
     several : bool
         Believe labels on ``sheet``, and elsewhere only where several of them stand together with
         numbers; the remarks then say which cells were read, and which labels were not believed.
-    given : collection of str
+    options : collection of str
         Keys that options replace: no remark is on them.
 
     Raises
@@ -72,7 +72,7 @@ def read_named_values(
         enough = [title for title in titles if weights[title] >= _BELIEVED]
         titles = sorted(enough, key=weights.__getitem__, reverse=True)
     result = NamedValues(file=book.label, values={}, places={})
-    said = []
+    notes = []
     for name in names:
         place, label = _by_defined_name(book, name), ""
         if place is None:
@@ -87,15 +87,15 @@ def read_named_values(
             complaints.append(result.error(key, message))
 
         result.values[name.key] = _single(name, value, label, decimal, complain)
-        if label and several and result.has(name.key) and name.key not in given:
+        if label and several and result.has(name.key) and name.key not in options:
             text = str(result.values[name.key]).removesuffix(".0")
-            said.append(f"{name.key} = {text} ({'!'.join(result.places[name.key])})")
+            notes.append(f"{name.key} = {text} ({'!'.join(result.places[name.key])})")
         if place and name.kind == "number" and isinstance(value, str) and result.has(name.key):
             result.text_cells.append(f"{place[0]}!{result.cell(name.key)}")
-    if said:
-        result.remarks.append(remark("table.beside_labels", values=", ".join(said)))
+    if notes:
+        result.remarks.append(remark("table.beside_labels", values=", ".join(notes)))
     for title in sorted({*labels} - {*titles}):
-        left = [f'"{v}"' for k, v in labels[title].items() if k not in {*given, *result.places}]
+        left = [f'"{v}"' for k, v in labels[title].items() if k not in {*options, *result.places}]
         if left:
             about = {"values": ", ".join(left), "sheet": title, "wanted": sheet}
             result.remarks.append(remark("table.no_setup_sheet", **about))
@@ -121,15 +121,15 @@ def _single(
         return convert.texts([value], complain)[0]
     if name.kind == "flag":
         return float(convert.flags([value], complain)[0])
-    said = unit_of(label)
+    symbol = unit_of(label)
     numbers, _, _ = convert.numbers(
-        name, [value], unit=said, decimal=decimal, elsewhere=set(), complain=complain
+        name, [value], unit=symbol, decimal=decimal, elsewhere=set(), complain=complain
     )
     number = float(np.asarray(numbers)[0])
-    unit = said or unknown_unit(label)
+    unit = symbol or unknown_unit(label)
     if np.isfinite(number) and name.unit and unit not in ("", name.unit):
         # Not converted: options of the command line are written into the same cell.
-        metric = converted(number, said, name.unit)
+        metric = converted(number, symbol, name.unit)
         advice = "" if metric is None else f" Write {metric:.15g}, and [{name.unit}]."
         complain(0, f'the label "{label.strip()}" says [{unit}], expected [{name.unit}].{advice}')
         return np.nan

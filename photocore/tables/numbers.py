@@ -78,17 +78,17 @@ class NumberText:
         plain_point = plain_point and "," not in self.digits
         if self.evidence == "none" or plain_point:
             return float(self.digits)
-        text, mark, other = (
+        text, mark, opposite = (
             (self.digits, ".", ",") if decimal == "point" else (self.digits, ",", ".")
         )
         mantissa = re.split("[eE]", text)[0]
         whole, _, fraction = mantissa.partition(mark)
-        if other in fraction or mark in fraction:
+        if opposite in fraction or mark in fraction:
             return None
-        if other in whole and not _GROUPED.match(whole):
+        if opposite in whole and not _GROUPED.match(whole):
             return None
         try:
-            return float(text.replace(other, "").replace(mark, "."))
+            return float(text.replace(opposite, "").replace(mark, "."))
         except ValueError:
             return None
 
@@ -159,10 +159,10 @@ def unit_symbol(text: str) -> str:
     return UNITS.get(word) or UNITS.get(_JOINTS.sub("", word), "")
 
 
-def converted(value: float, unit: str, wanted: str) -> float | None:
+def converted(value: float, unit: str, target: str) -> float | None:
     """Return a length in another unit, None where the two do not convert."""
-    if unit in METRES and wanted in METRES:
-        return float(f"{value * METRES[unit] / METRES[wanted]:.15g}")
+    if unit in METRES and target in METRES:
+        return float(f"{value * METRES[unit] / METRES[target]:.15g}")
     return None
 
 
@@ -194,12 +194,12 @@ def decimal_of(
         return evidence
     if evidence == "none":
         return "point"
-    own: Decimal = "comma" if evidence == "grouped comma" else "point"
+    mark: Decimal = "comma" if evidence == "grouped comma" else "point"
     if agreed:
-        return agreed if agreed == own or thousands else None
+        return agreed if agreed == mark or thousands else None
     if elsewhere:
-        return own if elsewhere == {own} else None
-    return "point" if own == "point" else None
+        return mark if elsewhere == {mark} else None
+    return "point" if mark == "point" else None
 
 
 #: A text that may be a number with three decimals or one with thousands.

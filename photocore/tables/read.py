@@ -155,10 +155,10 @@ def read_table(
         place = _CellPlace(*find_in_text(book, columns, column_map))
     else:
         place = _find(book, columns, name=name, sheet=sheet, column_map=column_map)
-    asked = column_map or {}
-    for key in (column.key for column in columns if column.key in asked):
+    mapping = column_map or {}
+    for key in (column.key for column in columns if column.key in mapping):
         if key not in place.match.columns:
-            about = {"asked": asked[key], "headings": describe(place.grid, place.match)}
+            about = {"asked": mapping[key], "headings": describe(place.grid, place.match)}
             raise InputError(remark("table.no_such_heading", of=book.label, key=key, **about))
     refuse_doubles(book.label, place.grid.title, place.match)
     refuse_unknown_units(book.label, place.grid.title, place.match, columns)
@@ -243,16 +243,22 @@ def _find(
             raise InputError(
                 remark("table.no_sheet", of=book.label, sheet=sheet, titles=_quoted(book.titles))
             )
-    wanted = bare(name or "")
+    sheet_name = bare(name or "")
     near: _CellPlace | None = None
     areas = [
-        a for a in book.tables if a.sheet in titles and bare(a.name) in (wanted, f"tbl{wanted}")
+        a
+        for a in book.tables
+        if a.sheet in titles and bare(a.name) in (sheet_name, f"tbl{sheet_name}")
     ]
     named = chain(
         (_in_area(book, area, columns, column_map) for area in areas),
-        (_in_sheet(book, title, columns, column_map) for title in titles if bare(title) == wanted),
+        (
+            _in_sheet(book, title, columns, column_map)
+            for title in titles
+            if bare(title) == sheet_name
+        ),
     )
-    for place in named if wanted else ():
+    for place in named if sheet_name else ():
         if place and not place.match.missing(columns):
             return place
         near = near or place
@@ -263,8 +269,8 @@ def _find(
         others = [p for p in whole if p is not best and p.match.score[:2] == best.match.score[:2]]
         if others:
             names = _quoted(p.grid.title for p in others)
-            told = remark("table.which_sheet", sheet=best.grid.title, others=names)
-            best.match.remarks.append(told)
+            note = remark("table.which_sheet", sheet=best.grid.title, others=names)
+            best.match.remarks.append(note)
         return best
     near = near or max(places, key=lambda place: place.match.score, default=None)
     raise _nothing_found(book, titles, columns, near)

@@ -232,7 +232,7 @@ def _solved(typed: Path, target: Path) -> bool:
         return False
     own = typed_content(solution, replace(result_content(solution, typed, None), log=()))
     try:
-        update_book(typed, target, solution.survey, own, given={}, overwrite=True)
+        update_book(typed, target, solution.survey, own, options={}, overwrite=True)
     except InputError:  # a workbook changed beyond recognition still takes the picks
         return False
     return True

@@ -22,7 +22,7 @@ from photocore.camera.pinhole import Pinhole, ray_on_plane
 from photocore.errors import GeometryError
 
 
-def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[PairUnknowns, Ties]:
+def refracted_start(inputs: Given, found: tuple[Features, Features]) -> tuple[PairUnknowns, Ties]:
     """Return approximate cameras and common points, seen through the media and freed of them.
 
     Raises
@@ -30,22 +30,22 @@ def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[Pai
     GeometryError
         If the photos have too little in common, or nothing gives the scale.
     """
-    ideal = [i.ideal(f.pixels) for i, f in zip(given.interiors, found, strict=True)]
-    first, second = (replace(i, lens=None, sigma_radial=0.0) for i in given.interiors)
-    distances = _supposed(given)
+    ideal = [i.ideal(f.pixels) for i, f in zip(inputs.interiors, found, strict=True)]
+    first, second = (replace(i, lens=None, sigma_radial=0.0) for i in inputs.interiors)
+    distances = _supposed(inputs)
     for _ in range(STAGES.freed_rounds):
-        square = _square_on(given, distances)
+        square = _square_on(inputs, distances)
         free1, free2 = straightened(square, ideal[0], ideal[1])
         features = replace(found[0], pixels=free1), replace(found[1], pixels=free2)
-        ties = find_ties(*features, (first, second), given.names)
+        ties = find_ties(*features, (first, second), inputs.names)
         first_picks, second_picks = (
             interior.ideal(pixels)
-            for interior, pixels in zip(given.interiors, given.control.picks, strict=False)
+            for interior, pixels in zip(inputs.interiors, inputs.control.picks, strict=False)
         )
         known1, known2 = straightened(square, first_picks, second_picks)
-        control = replace(given.control, pixels1=known1, pixels2=known2)
+        control = replace(inputs.control, pixels1=known1, pixels2=known2)
         cameras = first_cameras(ties, (first, second))
-        cameras = scaled(cameras, replace(given, control=control), (first, second))
+        cameras = scaled(cameras, replace(inputs, control=control), (first, second))
         before, distances = distances, (float(cameras[0].centre[2]), float(cameras[1].centre[2]))
         if np.abs(np.log(np.divide(distances, before))).max() < STAGES.freed_enough:
             break
@@ -55,12 +55,14 @@ def refracted_start(given: Given, found: tuple[Features, Features]) -> tuple[Pai
         views_of(square, ray_on_plane(camera, pixels))[k].pixels
         for k, (camera, pixels) in enumerate(straight)
     )
-    return PairUnknowns(cameras=cameras, media=given.media), replace(ties, seen1=bent1, seen2=bent2)
+    return PairUnknowns(cameras=cameras, media=inputs.media), replace(
+        ties, seen1=bent1, seen2=bent2
+    )
 
 
-def _square_on(given: Given, distances: tuple[float, float]) -> PairUnknowns:
+def _square_on(inputs: Given, distances: tuple[float, float]) -> PairUnknowns:
     """Return both cameras square to the wall at distances, no nearer than their media allow."""
-    media = given.media
+    media = inputs.media
     least = media.layers.thickness + (media.depth or 0.0)
     first, second = (
         Pinhole(
@@ -68,14 +70,14 @@ def _square_on(given: Given, distances: tuple[float, float]) -> PairUnknowns:
             np.diag([1.0, -1.0, -1.0]),
             np.array([0.0, 0.0, max(d, 1.05 * (least + (media.port or (0.0, 0.0))[k]))]),
         )
-        for k, (interior, d) in enumerate(zip(given.interiors, distances, strict=True))
+        for k, (interior, d) in enumerate(zip(inputs.interiors, distances, strict=True))
     )
     return PairUnknowns(cameras=(first, second), media=media)
 
 
-def _supposed(given: Given) -> tuple[float, float]:
+def _supposed(inputs: Given) -> tuple[float, float]:
     """Return the distances that are measured, or follow if both photos have one scale. [m]"""
-    (first, second), site, control = given.interiors, given.site, given.control
+    (first, second), site, control = inputs.interiors, inputs.site, inputs.control
     d1, d2 = site.distances
     ratio = min(second.focal / first.focal, 0.8)
     if d1 is None and d2 is None and site.delta_d:
@@ -84,7 +86,7 @@ def _supposed(given: Given) -> tuple[float, float]:
         a, b, length = control.lengths[0]
         ends = first.ideal(control.pixels1[[a, b]])
         apparent = length * first.focal / float(np.linalg.norm(ends[0] - ends[1]))
-        d1 = apparent * given.media.layers.indices[-1] / given.media.layers.indices[0]
+        d1 = apparent * inputs.media.layers.indices[-1] / inputs.media.layers.indices[0]
     if d1 is None and d2 is None:
         raise GeometryError(remark("align.no_scale"))
     far = d1 if d1 is not None else (d2 or 0.0) / ratio

@@ -63,7 +63,7 @@ def add_results(
     survey: SurveyInput,
     content: SurveyContent,
     *,
-    given: Mapping[str, object],
+    options: Mapping[str, object],
     overwrite: bool,
 ) -> BookUpdate:
     """Copy a workbook with the results in new columns of its own table; all else as it was.
@@ -76,7 +76,7 @@ def add_results(
         What was read from it.
     content : SurveyContent
         What came out, evaluated as formulas see it.
-    given : mapping
+    options : mapping
         The options that take the place of what the workbook says.
     overwrite : bool
         Replace an existing file.
@@ -96,7 +96,7 @@ def add_results(
     refuse_earlier(source, survey)
     editor = WorkbookEditor(source, survey.book)
     editor.home = "" if survey.book is None else home_of(survey.book)
-    content = replace(content, links=_links(editor, survey, given))
+    content = replace(content, links=_links(editor, survey, options))
     built = build(content)
     cells = {
         name: defined.attr_text
@@ -112,14 +112,14 @@ def add_results(
     else:
         named = dict(editor.named)
     store_named_cells(editor, built, content)
-    write_options(editor, content, given)
+    write_options(editor, content, options)
     write_corrections(editor, content)
     table = survey.table
     # A unit typed into the cells goes with the text; one of a heading stays.
     factors, typed = _factors(table), table.typed_units
     make_numbers(editor, table, lambda key: factors[key] if key in typed else 1.0)
     grid = editor.grid(table.sheet).rows
-    own = OwnTable(
+    users_table = OwnTable(
         sheet=table.sheet,
         head=head_row(grid, table.columns, table.headings, table.rows[0]),
         rows=table.rows,
@@ -127,20 +127,21 @@ def add_results(
         factors={key: factor for key, factor in factors.items() if key not in typed},
     )
     columns = sorted(
-        _columns(own, content, built), key=lambda column: (*_RESULTS, column.key).index(column.key)
+        _columns(users_table, content, built),
+        key=lambda column: (*_RESULTS, column.key).index(column.key),
     )
     # Names may mean something else to the user: formulas on their sheets hold addresses alone.
     plain = PlainFormulas((), named)
     columns = [replace(column, formula=plain.plain(column.formula, "")) for column in columns]
-    put_result_columns(editor, own, columns, mark=MARK)
+    put_result_columns(editor, users_table, columns, mark=MARK)
     return saved(editor, changed_results(editor, built), target, overwrite=overwrite)
 
 
 def _links(
-    editor: WorkbookEditor, survey: SurveyInput, given: Mapping[str, object]
+    editor: WorkbookEditor, survey: SurveyInput, options: Mapping[str, object]
 ) -> dict[str, str]:
     """Return where values of `Setup` stand in sheets of the user's own, to refer to them."""
-    replaced = cells_of(given)
+    replaced = cells_of(options)
     links = {}
     for key, (sheet, cell) in survey.setup.places.items():
         place = (sheet, *split_cell(cell))
@@ -186,8 +187,8 @@ def _columns(table: OwnTable, content: SurveyContent, built: BookBuilder) -> lis
 
 
 def _column(column: LiveColumn, values: Sequence[CellValue]) -> ResultColumn:
-    known = term("columns", column.key)
-    unit = "" if known is None else known.unit
+    wording = term("columns", column.key)
+    unit = "" if wording is None else wording.unit
     return ResultColumn(
         key=column.key,
         heading=f"{column.key} [{unit}]" if unit else column.key,

@@ -83,7 +83,7 @@ def store_functions(editor: WorkbookEditor) -> None:
 
 
 def write_options(
-    editor: WorkbookEditor, content: SurveyContent, given: Mapping[str, object]
+    editor: WorkbookEditor, content: SurveyContent, options: Mapping[str, object]
 ) -> None:
     """Write options into their cells, in place of the formula of a default too.
 
@@ -93,20 +93,22 @@ def write_options(
         If a cell has lost its name.
     """
     cells = {**setup_cells(content), "g_model": content.model}
-    wanted = cells_of(given.keys() - _OTHERS)
+    written = cells_of(options.keys() - _OTHERS)
     if content.is_pair:
-        wanted.discard("sigma_s")  # follows from sigma_px
+        written.discard("sigma_s")  # follows from sigma_px
         if content.sigma_px is not None:
-            wanted.add("sigma_px")
-        if "pair" in given or "adjust_setup" in given:
+            written.add("sigma_px")
+        if "pair" in options or "adjust_setup" in options:
             listed = groups(is_pair=True, media=content.media_cells)
             typed = {name for group in listed[:-1] for name in group}
-            wanted |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
+            written |= typed - {"delta_d", "sigma_r_max", "k_off", "k_plane", *TITLE_BLOCK}
     elif content.setup is not None:
-        wanted |= {"input_unit"} | ({"c_2", "enlargement_2"} if "adjust_setup" in given else set())
-    if {"d1", "d2", "pair"} & given.keys():
-        wanted |= _distances(editor, cells)
-    for name in sorted(wanted):
+        written |= {"input_unit"} | (
+            {"c_2", "enlargement_2"} if "adjust_setup" in options else set()
+        )
+    if {"d1", "d2", "pair"} & options.keys():
+        written |= _distances(editor, cells)
+    for name in sorted(written):
         place = place_of(editor, name)
         if place is None:
             if place_of(editor, "d_2") is not None and cells.get(name) is not None:
@@ -119,11 +121,11 @@ def write_options(
 def _holds(editor: WorkbookEditor, place: tuple[str, int, int], value: CellValue) -> bool:
     """Whether a cell holds a typed value, and no formula."""
     sheet, row, column = place
-    stands = editor.value_at(*place)
+    present = editor.value_at(*place)
     model = editor.models(sheet, row).get(column)
-    if stands is None and value == "mm":
+    if present is None and value == "mm":
         return True
-    return (stands == value) and (model is None or not model.formula)
+    return (present == value) and (model is None or not model.formula)
 
 
 def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
@@ -136,9 +138,9 @@ def _distances(editor: WorkbookEditor, cells: dict[str, CellValue]) -> set[str]:
         return {"d_1", "d_2"}
     # The difference as people write it: 8.1, not 8.100000000000001.
     cells["delta_d"] = round(float(first) - float(second), 12)
-    own = editor.models(d_1[0], d_1[1]).get(d_1[2])
-    stands = with_names(own.formula, editor.book.names) if own is not None else ""
-    follows = stands.replace(" ", "") == formulas()["d_1"]
+    model = editor.models(d_1[0], d_1[1]).get(d_1[2])
+    formula = with_names(model.formula, editor.book.names) if model is not None else ""
+    follows = formula.replace(" ", "") == formulas()["d_1"]
     return {"d_2", "delta_d"} if follows else {"d_1", "d_2", "delta_d"}
 
 
@@ -154,12 +156,12 @@ def write_corrections(editor: WorkbookEditor, content: SurveyContent) -> None:
         if matrix is None:
             continue
         for name, value in zip(adjustment_names(image), matrix.ravel().tolist(), strict=True):
-            own = place_of(editor, name)
-            if own is None:
-                own = (sheet, below, column)
+            own_place = place_of(editor, name)
+            if own_place is None:
+                own_place = (sheet, below, column)
                 editor.define(name, f"{quoted_title(sheet)}!{fixed_cell(below, column)}")
                 editor.put(sheet, below, 1, name)
                 editor.put(sheet, below, 2, word("correction", content.language).format(n=image))
                 below += 1
-            editor.put(*own, value, style=styles.get(column, ""))
+            editor.put(*own_place, value, style=styles.get(column, ""))
         below += 1

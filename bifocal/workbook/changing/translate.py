@@ -68,9 +68,9 @@ def _reword(
 ) -> None:
     """Write a named formula anew where words of the language stand in it."""
     sheet, _, cell = place.replace("$", "").partition("!")
-    sheet, own = plain_title(sheet), place_of(editor, name)
-    if ":" in cell or own is None or old[sheet][cell].data_type != "f":
+    sheet, anchor = plain_title(sheet), place_of(editor, name)
+    if ":" in cell or anchor is None or old[sheet][cell].data_type != "f":
         return
     formula = built.book[sheet][cell].value
     if formula != old[sheet][cell].value:
-        editor.put(*own, built.results[sheet].get(cell), formula=formula[1:])
+        editor.put(*anchor, built.results[sheet].get(cell), formula=formula[1:])

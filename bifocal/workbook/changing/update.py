@@ -84,7 +84,7 @@ def update_book(
     survey: SurveyInput,
     content: SurveyContent,
     *,
-    given: Mapping[str, object],
+    options: Mapping[str, object],
     overwrite: bool = False,
 ) -> BookUpdate:
     """Copy a survey workbook with fresh results in its formula cells; all else byte for byte.
@@ -102,7 +102,7 @@ def update_book(
         What was read from it.
     content : SurveyContent
         What came out, evaluated as the workbook's own formulas do, in the language wanted.
-    given : mapping
+    options : mapping
         The options that take the place of what the workbook says, by name.
     overwrite : bool
         Replace an existing file.
@@ -136,7 +136,7 @@ def update_book(
     added = add_missing_sheets(editor, built)
     store_named_cells(editor, built, content)
     store_functions(editor)
-    write_options(editor, content, given)
+    write_options(editor, content, options)
     write_corrections(editor, content)
     rows = [row - points.first for row in survey.table.rows]
     length = max([points.length, *(row + 1 for row in rows)])
@@ -148,17 +148,17 @@ def update_book(
         _table(editor, built, "tblWhatIf", listed)
     _print_points(editor, max(rows, default=0) + 1, content.language)
     for name, sheet_rows in (("tblCheck", survey.known_rows), ("tblGeo", survey.control_rows)):
-        own = editor.table(name)
-        if own is not None:
-            places = [row - own.first for row in sheet_rows]
-            if "control" in given:
-                _type_list(editor, built, own, sheet_rows)
+        area = editor.table(name)
+        if area is not None:
+            places = [row - area.first for row in sheet_rows]
+            if "control" in options:
+                _type_list(editor, built, area, sheet_rows)
             _table(editor, built, name, places)
             if name == "tblCheck" and "tblCompare" in built.tables:
-                _table(editor, built, "tblCompare", places, own.length)
+                _table(editor, built, "tblCompare", places, area.length)
     for name, key in _FIXED:
         _fixed_table(editor, built, name, key)
-    _verdict(editor, built, content, rules="rules" in given, words=other_words)
+    _verdict(editor, built, content, rules="rules" in options, words=other_words)
     _charts(editor, built, rows)
     _log(editor, content)
     changed = changed_results(editor, built)
@@ -216,8 +216,8 @@ def changed_results(editor: WorkbookEditor, built: BookBuilder) -> list[str]:
                     short = short_formula(name, column.formula, letters, area.area[0])
                     ours.add(normal(short(area.first)))
                     ours.add(normal(named_columns(short(area.first), columns_named)))
-                own = (headings[column.key], area.first, area.area[2])
-                places.setdefault(area.sheet, []).append(own)
+                span = (headings[column.key], area.first, area.area[2])
+                places.setdefault(area.sheet, []).append(span)
     for name, defined in built.book.defined_names.items():
         if name.startswith("unprinted_") or name in SPEAKING:
             continue  # follows how many points there were, or the version that wrote it
@@ -245,13 +245,13 @@ def _print_points(editor: WorkbookEditor, count: int, language: str) -> None:
         if place is None or area is None:
             continue
         sheet, row, column = place
-        stands = editor.models(sheet, row).get(column)
-        found = re.search(r">(\d+),", stands.formula if stands else "")
+        model = editor.models(sheet, row).get(column)
+        match = re.search(r">(\d+),", model.formula if model else "")
         head = area.area[0]
         last = min(count, CHART_ROWS) if name == "WhatIf" else count
-        if found and move_print_area(editor, area.sheet, head + int(found[1]), head + last):
+        if match and move_print_area(editor, area.sheet, head + int(match[1]), head + last):
             formula = unprinted_formula(language, count)
-            editor.put(*place, "", formula=formula, style=stands.style if stands else "")
+            editor.put(*place, "", formula=formula, style=model.style if model else "")
 
 
 def store_named_cells(editor: WorkbookEditor, built: BookBuilder, content: SurveyContent) -> None:
@@ -334,27 +334,27 @@ def _table(
     letters = {key: column_letters(number) for key, number in headings.items()}
     styles = editor.styles_of(area.sheet, first)
     is_typed = any(column.kind == "input" for column in content.columns)
-    stands = editor.grid(area.sheet).rows if is_typed else {}  # of a large sheet some 70 MB
+    grid = editor.grid(area.sheet).rows if is_typed else {}  # of a large sheet some 70 MB
     nothing: dict[int, Value] = {}
     filled, prepared = [], []
     for column in content.columns:
         if column.key not in headings:
             continue
-        given, number = content.cells.get(column.key, ()), headings[column.key]
+        cells, number = content.cells.get(column.key, ()), headings[column.key]
         style, is_input = styles.get(number, ""), column.kind == "input"
         if is_input and column.key not in TEXT_KEYS:
             # Points given by radial distances get the coordinates that are corrected.
             completed = bool(anew) and column.key in ("x1", "y1", "x2", "y2")
-            for row, value in zip(rows, given, strict=False):
-                there = stands.get(first + row, nothing).get(number)
-                is_text = isinstance(there, str) and _is_number(value)
-                if is_text or (completed and there is None and value is not None):
+            for row, value in zip(rows, cells, strict=False):
+                cell = grid.get(first + row, nothing).get(number)
+                is_text = isinstance(cell, str) and _is_number(value)
+                if is_text or (completed and cell is None and value is not None):
                     editor.set_value(area.sheet, first + row, number, value)
         if column.kind != "formula":
             prepared.append(NewColumn(number, [None] * (length - area.length), style))
         if is_input:
             continue
-        results = dict(zip(rows, given, strict=False))
+        results = dict(zip(rows, cells, strict=False))
         values = [results.get(row, column.spare) for row in range(length)]
         if column.kind == "value":
             typed = [None if value == "" else value for value in values]
@@ -398,13 +398,13 @@ def _fixed_table(editor: WorkbookEditor, built: BookBuilder, name: str, key: str
     area, content = editor.table(name), built.tables[name]
     if area is None:
         return
-    headings, given, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
+    headings, cells, grid = area.headings(), content.cells[key], editor.grid(area.sheet).rows
     # Check points are counted; the table has as many rows as there were when it was made.
-    if key not in headings or (key != "check_row" and area.length != len(given)):
+    if key not in headings or (key != "check_row" and area.length != len(cells)):
         return
-    count = min(area.length, len(given))
+    count = min(area.length, len(cells))
     stand = [grid.get(area.first + i, {}).get(headings[key]) for i in range(count)]
-    if stand == [float(value or 0) for value in given[:count]]:
+    if stand == [float(value or 0) for value in cells[:count]]:
         _table(editor, built, name, range(count))
 
 
@@ -418,24 +418,24 @@ def _verdict(
     rules, words : bool
         Whether the rules, and the formulas with their two words, are written anew.
     """
-    area, wanted = editor.table("tblVerdict"), built.tables["tblVerdict"]
+    area, table = editor.table("tblVerdict"), built.tables["tblVerdict"]
     if area is None or not {"tolerance", "verdict"} <= area.headings().keys():
         return
     headings, first, grid = area.headings(), area.first, editor.grid(area.sheet).rows
     accuracy = built.value_of("check_worst")
     holds, fails = word("holds", content.language), word("fails", content.language)
-    formula = row_formula(area.name, wanted.columns[-1].formula)[1:]
-    count = len(wanted.cells["rule"]) if rules else 0
+    formula = row_formula(area.name, table.columns[-1].formula)[1:]
+    count = len(table.cells["rule"]) if rules else 0
     length = max(area.length, count)
     style = editor.styles_of(area.sheet, first).get(headings["verdict"], "")
     for i in range(length):
         row = first + i
         tolerance = grid.get(row, {}).get(headings["tolerance"])
         if rules:
-            asked = {key: wanted.cells[key][i] if i < count else None for key in headings}
-            tolerance = asked["tolerance"]
-            for key in asked.keys() - {"verdict"}:
-                type_value(editor, (area.sheet, row, headings[key]), asked[key])
+            cells = {key: table.cells[key][i] if i < count else None for key in headings}
+            tolerance = cells["tolerance"]
+            for key in cells.keys() - {"verdict"}:
+                type_value(editor, (area.sheet, row, headings[key]), cells[key])
         result = ""
         if isinstance(tolerance, int | float) and isinstance(accuracy, int | float):
             result = holds if accuracy <= tolerance / 1000 else fails
@@ -455,9 +455,9 @@ def _charts(editor: WorkbookEditor, built: BookBuilder, rows: Sequence[int]) -> 
     place = place_of(editor, "chart_vectors")
     if place is not None:  # programs whose titles follow no cell show what is stored in the chart
         cell = built.book.defined_names["chart_vectors"].attr_text.rpartition("!")[2]
-        stands, empty = editor.value_at(*place), built.word("chart_vectors").format(n=1)
-        said = str(built.results["Charts"][cell.replace("$", "")])
-        editor.replace_text(place[0], stands if isinstance(stands, str) else empty, said)
+        heading, empty = editor.value_at(*place), built.word("chart_vectors").format(n=1)
+        text = str(built.results["Charts"][cell.replace("$", "")])
+        editor.replace_text(place[0], heading if isinstance(heading, str) else empty, text)
     block: RowBlock = built.blocks["Charts"]
     cells = editor.grid(title).rows
     last = max((row for row, values in cells.items() if LEFT + 1 in values), default=HEAD)
@@ -476,8 +476,8 @@ def _log(editor: WorkbookEditor, content: SurveyContent) -> None:
     if area is None or not content.log:
         return
     headings = area.headings()
-    told = zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
-    entry = {key: value for key, value in told if key in headings}
+    entries = zip(("time", "program", "what", "file", "sha256"), content.log[-1], strict=True)
+    entry = {key: value for key, value in entries if key in headings}
     cells = editor.grid(area.sheet).rows
     _, left, bottom, right = area.area
     if not any(column in cells.get(bottom, {}) for column in range(left, right + 1)):

@@ -62,9 +62,16 @@ def ideal_points(
     """
     coordinates = lens or others > 0
     polar, theta = polar and not coordinates, theta and not coordinates
-    there = {"xy": xy, "polar": polar, "theta": theta, "code": code, "media": media, "lens": lens}
-    there["others"] = others
-    facts = {name for name, has in there.items() if has} | {f"corrected{i}" for i in adjusted}
+    conditions = {
+        "xy": xy,
+        "polar": polar,
+        "theta": theta,
+        "code": code,
+        "media": media,
+        "lens": lens,
+    }
+    conditions["others"] = others
+    facts = {name for name, has in conditions.items() if has} | {f"corrected{i}" for i in adjusted}
     codes = (f'LEFT(UPPER(TRIM([@code])),{len(word)})="{word}"' for word in DOUBT_CODES)
     doubt = {"doubt_codes": ",".join(codes), "doubt_share": repr(DOUBTFUL_SHARE)}
     parts = doubt | _layers(media) | placed_parts() | _sums(others)
@@ -140,8 +147,8 @@ def pair_points(
     leaning : bool
         Whether `Setup` has cells for ports that lean.
     """
-    there = {"undistorted": undistorted, "media": media, "pair": True, "leaning": leaning}
-    facts = {name for name, has in there.items() if has}
+    conditions = {"undistorted": undistorted, "media": media, "pair": True, "leaning": leaning}
+    facts = {name for name, has in conditions.items() if has}
     return FORMULAS.columns("pair_points", facts, _layers(media) | placed_parts())
 
 

@@ -15,22 +15,22 @@ _MOVED = {
 }
 
 
-def entry(one: str, other: str) -> str:
+def entry(first: str, second: str) -> str:
     """Return the name of an entry of a symmetric matrix, whichever way round."""
-    return min(one, other) + max(one, other)
+    return min(first, second) + max(first, second)
 
 
-def ordered(one: str, other: str) -> str:
+def ordered(first: str, second: str) -> str:
     """Return the key of an entry of the covariance of turns and stretch, whichever way round."""
-    return one + other if SMALL.index(one) <= SMALL.index(other) else other + one
+    return first + second if SMALL.index(first) <= SMALL.index(second) else second + first
 
 
-def added_covariance(one: str, other: str, cells: Mapping[str, str]) -> str:
+def added_covariance(first: str, second: str, cells: Mapping[str, str]) -> str:
     """Return what the transformation adds to the covariance of two of E, N, H, as a formula.
 
     Parameters
     ----------
-    one, other : str
+    first, second : str
         ``E``, ``N`` or ``H``, in that order; the same for a variance.
     cells : mapping
         Where the point's E, N, H from the whole-metre origin stand.
@@ -40,14 +40,14 @@ def added_covariance(one: str, other: str, cells: Mapping[str, str]) -> str:
     def add(axes: str, sign: int, name: str) -> None:
         sums.setdefault("".join(sorted(axes, key="ENH".index)), []).append((sign, name))
 
-    for own, across in ((one, other), (other, one)):
+    for row, across in ((first, second), (second, first)):
         for small, (sign, axis) in _MOVED[across].items():
-            add(axis, -sign, f"g_u_{own}{small}")
-    for left, (sign, axis) in _MOVED[one].items():
-        for right, (turned, along) in _MOVED[other].items():
-            add(axis + along, sign * turned, f"g_w_{ordered(left, right)}")
+            add(axis, -sign, f"g_u_{row}{small}")
+    for unit, (sign, axis) in _MOVED[first].items():
+        for right, (turned, along) in _MOVED[second].items():
+            add(axis + along, sign * turned, f"g_w_{ordered(unit, right)}")
     # Each coordinate is named as rarely as can be: these formulas stand in every row.
-    whole = f"g_z_{one if one == other else one + other}"
+    whole = f"g_z_{first if first == second else first + second}"
     for axis in "ENH":
         terms = [
             (axes.removeprefix(axis), named) for axes, named in sums.items() if axes[0] == axis
@@ -77,16 +77,16 @@ def _summed(named: Sequence[tuple[int, str]]) -> dict[str, int]:
     return sums
 
 
-def turned_covariance(one: str, other: str) -> str:
+def turned_covariance(one: str, cross: str) -> str:
     """Return the covariance of two of E, N, H, for scale 1, that one on the wall gives.
 
     Its entries XX, XY ... are parts of a formula: ``{1}`` calls them by what ``{2}`` begins.
     """
-    first, second = ("ENH".index(name) + 1 for name in (one, other))
+    first, second = ("ENH".index(name) + 1 for name in (one, cross))
     terms = []
     for (i, a), (j, b) in combinations_with_replacement(enumerate("XYZ", start=1), 2):
         factor = f"g_{first}{i}*g_{second}{j}"
-        if i != j and one == other:
+        if i != j and one == cross:
             factor = f"2*{factor}"
         elif i != j:
             factor = f"({factor}+g_{first}{j}*g_{second}{i})"
@@ -97,7 +97,7 @@ def turned_covariance(one: str, other: str) -> str:
 def placed_parts() -> dict[str, str]:
     """Return parts of formulas, each of a pair: ``turned_EN``, ``added_EN`` and the variances."""
     cells = {axis: f"{{{{1}} n_ {axis}}}" for axis in "ENH"}
-    pairs = [one + other for one, other in combinations_with_replacement("ENH", 2)]
+    pairs = [first + second for first, second in combinations_with_replacement("ENH", 2)]
     return {
         **{f"turned_{pair}": turned_covariance(pair[0], pair[1]) for pair in pairs},
         **{f"added_{pair}": added_covariance(pair[0], pair[1], cells) for pair in pairs},

@@ -178,8 +178,8 @@ def formulas(
     parts["inner"] = "".join(f"-N({name})" for name in thickness_names(media))
     parts["glass"] = "".join(f"+N(thick_{n})*n_used_1/n_used_{n}" for n in range(2, media))
     parts["others"] = " ".join(map(str, other_numbers(others)))
-    there = {"pair": is_pair, "media": media, "leaning": leaning}
-    facts = {name for name, holds in there.items() if holds}
+    conditions = {"pair": is_pair, "media": media, "leaning": leaning}
+    facts = {name for name, holds in conditions.items() if holds}
     missing = _missing_formula(_PAIR_NEEDED if is_pair else _IDEAL_NEEDED, _stated(media))
     lines = FORMULAS.columns("setup", facts, parts, rows="lines")
     return {line.key: line.formula for line in lines} | {"setup_missing": missing}

@@ -108,8 +108,8 @@ class SpaceBlock:
         world = [f"tblGeo[c{name}]" for _, name in _KEYS]
         axes = [axis for axis, _ in _KEYS]
 
-        def weight(one: str, other: str) -> str:
-            return f"tblGeo[p_{entry(one, other)}]"
+        def weight(first: str, second: str) -> str:
+            return f"tblGeo[p_{entry(first, second)}]"
 
         def freed(i: int, j: int) -> str:
             both = f"{weight(axes[i], axes[j])},{world[i]},{world[j]}"
@@ -180,13 +180,13 @@ class SpaceBlock:
                 return b[i]
             axis, world = divmod(i, 3)
             # e_j x column: for each axis of the wall another row of B, or nothing.
-            for own, other, sign in _axis_rows(j):
-                if own == axis:
-                    return f"{'-' if sign < 0 else ''}{b[3 * other + world]}"
+            for main, cross, sign in _axis_rows(j):
+                if main == axis:
+                    return f"{'-' if sign < 0 else ''}{b[3 * cross + world]}"
             return "0"
 
-        def product_of(one: CellMatrix, other: CellMatrix) -> Callable[[int, int], str]:
-            return lambda i, j: f"SUMPRODUCT({one.column(i)},{other.column(j)})"
+        def product_of(first: CellMatrix, second: CellMatrix) -> Callable[[int, int], str]:
+            return lambda i, j: f"SUMPRODUCT({first.column(i)},{second.column(j)})"
 
         self.design = slopes = put("D", (9, 4), design)
         product = put("HD", (9, 4), product_of(reduced, slopes))

@@ -21,17 +21,17 @@ def _at(x: float, z: float) -> Place:
     return _ZERO[0] + _UNIT * x, _ZERO[1] - _UNIT * z
 
 
-def cameras_sketch(nadir: str, told: str) -> Sketch:
+def cameras_sketch(nadir: str, caption: str) -> Sketch:
     """Return the drawing.
 
     Parameters
     ----------
     nadir : str
         The word at the foot of the perpendicular.
-    told : str
+    caption : str
         What is to be seen, in words.
     """
-    sketch = Sketch(size=SIZE, told=told)
+    sketch = Sketch(size=SIZE, told=caption)
     sketch.line(_at(-1.2, 0), _at(4.6, 0), INK, width=2.0)
     left, right = _X - 0.55, _X + 0.55
     for start, end in (

@@ -81,13 +81,13 @@ def _checked(sheet: SheetBuilder, content: SurveyContent, head: int) -> None:
     head : int
         Row of the keys of their numbers, below those of the other charts.
     """
-    told = sheet.book.word("chart_vectors").split("{n}")
+    parts = sheet.book.word("chart_vectors").split("{n}")
     bins, vectors = FORMULAS.columns("bins"), FORMULAS.columns("vectors")
     counts = _bin_cells()
     (line,) = FORMULAS.columns("vectors", rows="lines")
     place = f"{column_letters(LEFT + 6)}{head - 2}"
     sheet.formula(place, line.formula, form=line.number_format, name=line.key)
-    live = f'"{told[0]}"&{line.key}&"{told[1]}"'
+    live = f'"{parts[0]}"&{line.key}&"{parts[1]}"'
     at = f"{column_letters(LEFT + 7)}{head - 2}"
     sheet.formula(at, live, name="chart_vectors", font=LABEL_FONT)
     rows = len(counts["sigmas_from"])

@@ -52,17 +52,17 @@ def functions_sheet(builder: BookBuilder, *, named: bool) -> None:
 def _function(sheet: SheetBuilder, row: int, name: str, *, named: bool) -> int:
     """Write a function from a row on; return the row of the next one."""
     book, columns = sheet.book, FUNCTIONS.columns(name)
-    told = Wording(**FUNCTIONS.content["functions"][name])
+    wording = Wording(**FUNCTIONS.content["functions"][name])
     values, labels = FUNCTIONS.content[name]["values"], FUNCTIONS.content["labels"]
     places = {column.key: f"$C${row + 1 + i}" for i, column in enumerate(columns)}
     sheet.text(f"A{row}", name, HEAD_FONT)
-    sheet.text(f"B{row}", told.in_language(book.language), HEAD_FONT)
+    sheet.text(f"B{row}", wording.in_language(book.language), HEAD_FONT)
     for column, value in zip(columns, values, strict=True):
         row += 1
         cell = f"C{row}"
         key, number = column.key, column.key.rpartition("_")[2]
         if key == name:
-            text, unit = book.word("by_cells"), told.unit
+            text, unit = book.word("by_cells"), wording.unit
         else:
             label = Wording(**labels[key if key in labels else key.rstrip("0123456789")])
             text, unit = label.in_language(book.language).format(n=number), label.unit
@@ -73,17 +73,17 @@ def _function(sheet: SheetBuilder, row: int, name: str, *, named: bool) -> int:
         else:
             sheet.input(cell, value)
             sheet.validate(cell, title=key, prompt=text, limits=(-1e7, 1e7))
-    given = [column.key for column in columns if not column.formula]
-    call = f"{name}({','.join(places[key] for key in given)})"
+    inputs = [column.key for column in columns if not column.formula]
+    call = f"{name}({','.join(places[key] for key in inputs)})"
     row += 1
-    sheet.describe(row, (f"={name}", book.word("by_function")), told.unit)
+    sheet.describe(row, (f"={name}", book.word("by_function")), wording.unit)
     sheet.formula(f"C{row}", call, values[-1], form="0.000000")
     if named:
         # As an array formula: else Excel reads it as @NAME(...), for one cell.
         sheet.worksheet[f"C{row}"] = ArrayFormula(f"C{row}", f"={call}")
         book.define(name, lambda_text(columns))
     row += 1
-    text = f"{name}({', '.join(given)}) = {_written(columns, '{}')}"
+    text = f"{name}({', '.join(inputs)}) = {_written(columns, '{}')}"
     sheet.describe(row, ("", book.word("google")))
     sheet.text(f"B{row + 1}", text)
     sheet.worksheet[f"B{row + 1}"].alignment = Alignment(wrap_text=True, vertical="top")
@@ -99,9 +99,9 @@ def lambda_text(columns: Sequence[LiveColumn]) -> str:
     columns : sequence of LiveColumn
         What is given, steps on the way, the result last.
     """
-    given = (f"_xlpm.{column.key}" for column in columns if not column.formula)
+    inputs = (f"_xlpm.{column.key}" for column in columns if not column.formula)
     body = _written(columns, "_xlpm.{}").replace("LET(", "_xlfn.LET(", 1)
-    return f"_xlfn.LAMBDA({','.join(given)},{body})"
+    return f"_xlfn.LAMBDA({','.join(inputs)},{body})"
 
 
 def _written(columns: Sequence[LiveColumn], called: str) -> str:

@@ -62,10 +62,10 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
     for image in (1, 2):
         names = [name for name in adjustment_names(image) if name in cells]
         for name in names:
-            told = word("correction", builder.language).format(n=image)
-            sheet.describe(row, (name, told))
+            text = word("correction", builder.language).format(n=image)
+            sheet.describe(row, (name, text))
             sheet.input(f"C{row}", cells[name], name=name)
-            sheet.validate(f"C{row}", title=name, prompt=told, limits=_NUMBERS)
+            sheet.validate(f"C{row}", title=name, prompt=text, limits=_NUMBERS)
             row += 1
     for letter in _COLUMNS[: 1 + content.others]:
         area = f"{letter}5:{letter}{row}"
@@ -87,11 +87,11 @@ def _setup_cell(
 ) -> None:
     """Write one named value with its description and unit."""
     bent = term("setup", f"{name}_media") if content.media_cells else None
-    known = bent or term("setup", name)
+    entry = bent or term("setup", name)
     matrix = f"H{name[1]}({name[3:4]},{name[4:5]})"
-    told = known.in_language(sheet.book.language) if known else matrix
-    unit = known.unit if known else ""
-    sheet.describe(row, (name, told), unit)
+    description = entry.in_language(sheet.book.language) if entry else matrix
+    unit = entry.unit if entry else ""
+    sheet.describe(row, (name, description), unit)
     is_default = {
         "d_1": content.pair is None,
         "sigma_s": content.setup is None or content.setup.measuring.sigma_s is None,
@@ -99,18 +99,20 @@ def _setup_cell(
     }
     # Those of further photos stand beside a value of the second one.
     names, form = (name, *beside(name, content.others)), number_format(name)
-    for letter, own in zip(_COLUMNS, names, strict=False):
-        cell, value = f"{letter}{row}", cells.get(own)
+    for letter, cell_name in zip(_COLUMNS, names, strict=False):
+        cell, value = f"{letter}{row}", cells.get(cell_name)
         sheet.worksheet[cell].alignment = Alignment(horizontal="right")
         if typed:
-            prompt = told if own == name else f"{own}: {told}"
+            prompt = description if cell_name == name else f"{cell_name}: {description}"
             _validate(sheet, cell, name, f"{prompt} [{unit}]" if unit else prompt)
-        if own in content.links:
-            sheet.formula(cell, content.links[own], value, form=form, name=own, editable=True)
-        elif not typed or (own in live and is_default.get(own, False)):
-            sheet.formula(cell, live[own], form=form, name=own, editable=typed)
+        if cell_name in content.links:
+            sheet.formula(
+                cell, content.links[cell_name], value, form=form, name=cell_name, editable=True
+            )
+        elif not typed or (cell_name in live and is_default.get(cell_name, False)):
+            sheet.formula(cell, live[cell_name], form=form, name=cell_name, editable=typed)
         else:
-            sheet.input(cell, value, form=form, name=own)
+            sheet.input(cell, value, form=form, name=cell_name)
 
 
 def pair_names(others: int) -> list[str]:

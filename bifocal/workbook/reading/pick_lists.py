@@ -67,15 +67,15 @@ def read_picks(path: Path | str, decimal: Decimal | None = None) -> PickList:
         If the file holds no picks, or a point has no name or two places.
     """
     path = Path(path)
-    found = _of_drawing(path) if path.suffix.lower() == ".dxf" else _of_table(path, decimal)
-    if not found.ids:
+    picks = _of_drawing(path) if path.suffix.lower() == ".dxf" else _of_table(path, decimal)
+    if not picks.ids:
         raise InputError(f"{path}: holds no picks.")
-    seen: set[str] = set()
-    for name in found.ids:
-        if name in seen:
+    names: set[str] = set()
+    for name in picks.ids:
+        if name in names:
             raise InputError(f"{path}: the point {name!r} stands there twice; give each one place.")
-        seen.add(name)
-    return found
+        names.add(name)
+    return picks
 
 
 def joined(first: PickList, second: PickList, unit: str | None = None) -> PointObservations:
@@ -89,34 +89,36 @@ def joined(first: PickList, second: PickList, unit: str | None = None) -> PointO
     units = {unit} if unit else {first.unit, second.unit} - {""}
     if len(units) > 1:
         files = {"first": first.file, "second": second.file}
-        said = {"unit1": first.unit, "unit2": second.unit}
-        raise InputError(remark("survey.units_of_lists", **files, **said))
+        unit_words = {"unit1": first.unit, "unit2": second.unit}
+        raise InputError(remark("survey.units_of_lists", **files, **unit_words))
     place = {name: row for row, name in enumerate(second.ids)}
     ids = tuple(name for name in first.ids if name in place)
     if not ids:
-        here, there = (", ".join(one.ids[:3]) for one in (first, second))
+        first_ids, second_ids = (", ".join(one.ids[:3]) for one in (first, second))
         files = {"first": first.file, "second": second.file}
-        raise InputError(remark("survey.no_common_point", **files, here=here, there=there))
+        raise InputError(
+            remark("survey.no_common_point", **files, here=first_ids, there=second_ids)
+        )
     rows = {name: row for row, name in enumerate(first.ids)}
     one = first.places[[rows[name] for name in ids]]
-    other = second.places[[place[name] for name in ids]]
+    partners = second.places[[place[name] for name in ids]]
     if (units or {"px"}) == {"px"}:
-        return PointObservations(ids=ids, pixels1=one, pixels2=other)
-    return PointObservations(ids=ids, xy1=one, xy2=other)
+        return PointObservations(ids=ids, pixels1=one, pixels2=partners)
+    return PointObservations(ids=ids, xy1=one, xy2=partners)
 
 
 def left_over(first: PickList, second: PickList) -> list[str]:
     """Return a sentence for each list that holds points which the other does not."""
-    said = []
-    for one, other in ((first, second), (second, first)):
-        alone = [name for name in one.ids if name not in set(other.ids)]
+    notes = []
+    for one, partner in ((first, second), (second, first)):
+        alone = [name for name in one.ids if name not in set(partner.ids)]
         if alone:
             more = " ..." if len(alone) > 10 else ""
-            said.append(
-                f"{one.file.name}: {len(alone)} point(s) not in {other.file.name}, left out: "
+            notes.append(
+                f"{one.file.name}: {len(alone)} point(s) not in {partner.file.name}, left out: "
                 f"{', '.join(alone[:10])}{more}"
             )
-    return said
+    return notes
 
 
 def _of_table(path: Path, decimal: Decimal | None) -> PickList:
@@ -130,11 +132,11 @@ def _of_table(path: Path, decimal: Decimal | None) -> PickList:
     names = [name or "" for name in table.texts("id")]
     places = np.stack([table.numbers(key) for key in keys], axis=-1)
     for row, name in enumerate(names):
-        given = ~np.isnan(places[row])
-        if given.any() and not given.all():
-            key = keys[int(np.argmin(given))]
+        filled = ~np.isnan(places[row])
+        if filled.any() and not filled.all():
+            key = keys[int(np.argmin(filled))]
             errors.append(table.error(row, key, "is blank; a pick has two coordinates."))
-        elif given.all() and not name:
+        elif filled.all() and not name:
             errors.append(table.error(row, "id", "the pick has no name; give it one."))
     if errors:
         raise WorkbookError(errors)

@@ -178,16 +178,16 @@ def read_survey(path: Path | str, options: ReadOptions | None = None) -> SurveyI
         _require_coordinates(table, book, path)
     points, unit = _observations(table, errors, options.photos)
     sheets = book if isinstance(book, SheetFile) else None
-    setup = read_setup(book, errors, decimal=options.decimal, given=options.given)
+    setup = read_setup(book, errors, decimal=options.decimal, options=options.given)
     check = _known(book, "Check", ("X_ref", "Y_ref", "Z_ref"), options.decimal, errors)
     control = _known(book, "Georeference", ("E", "N", "H"), options.decimal, errors)
     parts = (table, setup, check, control)
     model, language, is_ours, tape = "auto", "en", False, None
     if sheets is not None:
-        asked = read_named_values(
+        named = read_named_values(
             sheets, [Column("g_model", kind="text")], sheet="Georeference", errors=errors
         )
-        model = asked.text("g_model") or "auto"
+        model = named.text("g_model") or "auto"
         tape = _taped(sheets, options.decimal, errors)
         language = _language(sheets)
         is_ours = any(area.name == "tblPoints" for area in sheets.tables)
@@ -320,8 +320,8 @@ def _read_points(book: SheetFile | CsvFile, options: ReadOptions, errors: list[C
             if last:
                 raise
             continue
-        given = table.present & {*XY, *PIXELS, "s1", "s2"}
-        if last or (given and (not shared or table.present.issuperset(shared))):
+        keys = table.present & {*XY, *PIXELS, "s1", "s2"}
+        if last or (keys and (not shared or table.present.issuperset(shared))):
             break
     errors.extend(complaints)
     for key in followed:
@@ -354,8 +354,8 @@ def _require_coordinates(table: Table, book: object, path: Path | str) -> None:
         text = remark("survey.no_points_sheet", of=Path(path).name, sheets=shown)
         raise InputError(f"{text} {advice('rename', first='id')}")
     groups = [keys for keys in kinds if have & set(keys) and not have.issuperset(keys)]
-    wanted = groups[0] if groups else XY
-    missing = ", ".join(key for key in wanted if key not in have)
+    columns = groups[0] if groups else XY
+    missing = ", ".join(key for key in columns if key not in have)
     how = advice("rename", first=missing.partition(",")[0])
     raise InputError(f"{remark('survey.no_column', of=where, missing=missing)} {how}")
 
@@ -389,8 +389,8 @@ def _observations(
     ids = table.texts("id")
     if "id" not in table.present:
         ids = [str(number) for number in range(1, len(table) + 1)]
-    said = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
-    if said and len(table) and "s1" in table.present and "x1" not in table.present:
+    is_angle = bare(table.headings.get("theta", "")) in ("angle", "angolo", "winkel")
+    if is_angle and len(table) and "s1" in table.present and "x1" not in table.present:
         about = {"cell": table.cell(0, "theta"), "heading": table.headings["theta"]}
         table.remarks.append(remark("survey.angle_as_theta", **about))
     errors += table.repeated("id")
@@ -423,13 +423,13 @@ def _observations(
 
 def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
     """Return ``mm`` or ``px`` as the headings say, and the factor to it."""
-    said = {key: table.units[key] for key in XY if table.units.get(key)}
-    kinds = set(said.values())
+    units = {key: table.units[key] for key in XY if table.units.get(key)}
+    kinds = set(units.values())
     if not kinds:
         return "", 1.0
     if len(kinds) > 1:
-        key = next(iter(said))
-        shown = ", ".join(f"{name} [{symbol}]" for name, symbol in said.items())
+        key = next(iter(units))
+        shown = ", ".join(f"{name} [{symbol}]" for name, symbol in units.items())
         errors.append(
             CellError(
                 remark("survey.units_differ", units=shown),
@@ -440,15 +440,15 @@ def _unit_of_xy(table: Table, errors: list[CellError]) -> tuple[str, float]:
         )
         return "", 1.0
     symbol = kinds.pop()
-    bare_keys = [k for k in XY if k not in said and not np.isnan(table.numbers(k)).all()]
-    for key in sorted(table.typed_units.intersection(said)) if bare_keys else ():
+    bare_keys = [k for k in XY if k not in units and not np.isnan(table.numbers(k)).all()]
+    for key in sorted(table.typed_units.intersection(units)) if bare_keys else ():
         row = int(np.flatnonzero(~np.isnan(table.numbers(key)))[0])
         message = remark("survey.unit_of_one", unit=symbol, others=", ".join(bare_keys))
         errors.append(table.error(row, key, message))
     if symbol == "px":
         return "px", 1.0
     if symbol not in TO_MM:
-        errors.append(table.unit_error(next(iter(said)), symbol, "mm or px"))
+        errors.append(table.unit_error(next(iter(units)), symbol, "mm or px"))
         return "", 1.0
     return "mm", TO_MM[symbol]
 

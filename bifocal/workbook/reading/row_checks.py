@@ -37,16 +37,16 @@ def check_rows(
     others = points.other_xy.transpose(1, 0, 2)
     groups = [
         (XY, xy), (PIXELS, pixels), (("s1", "s2"), polar[:, :2]),
-        *(((f"x{k}", f"y{k}"), own) for k, own in enumerate(others, start=3)),
+        *(((f"x{k}", f"y{k}"), further) for k, further in enumerate(others, start=3)),
     ]  # fmt: skip
     for keys, values in groups:
-        given = ~np.isnan(values)
-        partly = used & given.any(axis=1) & ~given.all(axis=1)
+        filled = ~np.isnan(values)
+        partly = used & filled.any(axis=1) & ~filled.all(axis=1)
         if keys == ("s1", "s2"):
             # Image coordinates, where both photos have them, make the radial distances idle.
             partly &= np.isnan(xy).all(axis=1)
         for row in np.flatnonzero(partly).tolist():
-            lacking = [key for i, key in enumerate(keys) if not given[row, i]]
+            lacking = [key for i, key in enumerate(keys) if not filled[row, i]]
             if any(key in failed or (table.cell(row, key), key) in faulty for key in lacking):
                 continue  # its own complaint stands already
             errors.append(table.error(row, lacking[0], _incomplete(ids[row], keys, lacking)))
@@ -58,18 +58,20 @@ def check_rows(
 
 def _check_photos(table: Table, points: PointObservations, errors: list[CellError]) -> None:
     """Complain about used points with half a pick, or picks in fewer than two photos of a set."""
-    given = ~np.isnan(np.stack(points.pixels, axis=1))
+    filled = ~np.isnan(np.stack(points.pixels, axis=1))
     for row in np.flatnonzero(points.use).tolist():
-        halves = np.argwhere(given[row].any(axis=1)[:, None] & ~given[row])
-        seen = given[row].all(axis=1)
+        halves = np.argwhere(filled[row].any(axis=1)[:, None] & ~filled[row])
+        photos = filled[row].all(axis=1)
         if len(halves):
             photo, axis = halves[0].tolist()
             keys = pixel_keys(photo + 1)
             message = _incomplete(points.ids[row], keys, [keys[axis]])
             errors.append(table.error(row, keys[axis], message))
-        elif seen.sum() < 2:
-            key = pixel_keys(int(np.flatnonzero(~seen)[0]) + 1)[0]
-            where = f"only on image {int(np.flatnonzero(seen)[0]) + 1}" if seen.any() else "on none"
+        elif photos.sum() < 2:
+            key = pixel_keys(int(np.flatnonzero(~photos)[0]) + 1)[0]
+            where = (
+                f"only on image {int(np.flatnonzero(photos)[0]) + 1}" if photos.any() else "on none"
+            )
             message = remark("survey.seen_once", name=points.ids[row], seen=where)
             errors.append(table.error(row, key, message))
 
@@ -78,6 +80,6 @@ def _incomplete(name: str, keys: Sequence[str], lacking: Sequence[str]) -> str:
     images = {key[-1] for key in lacking}
     here = {key[-1] for key in keys if key not in lacking}
     if len(images) == 1 and images.isdisjoint(here):
-        other = "2" if images == {"1"} else "1"
-        return remark("survey.one_image", name=name, image=other, other=images.pop())
+        partner = "2" if images == {"1"} else "1"
+        return remark("survey.one_image", name=name, image=partner, other=images.pop())
     return f"point {name} lacks {', '.join(lacking)}; complete it, or set use = 0."

@@ -80,7 +80,7 @@ def home_of(book: SheetFile) -> str | None:
     return ""
 
 
-def settle_names(book: SheetFile, given: Collection[str]) -> None:
+def settle_names(book: SheetFile, options: Collection[str]) -> None:
     """Leave of a workbook's names those that are of a set-up.
 
     Where no sheet of ours stands, names of the user's own are believed if two of the values that
@@ -91,15 +91,15 @@ def settle_names(book: SheetFile, given: Collection[str]) -> None:
         return
     names = book.names_on(home) if home else {}
     if not home:
-        stated = {n: p for n, p in book.names.items() if n in numbers() and n not in given}
+        stated = {n: p for n, p in book.names.items() if n in numbers() and n not in options}
         values = {n: book.grid(t).rows.get(row, {}).get(c) for n, (t, row, c) in stated.items()
                   if t in book.titles}  # fmt: skip
         read = {n: v for n, v in values.items() if isinstance(v, float)}
         if len(read.keys() & _BELIEVED) > 1:
             names = {name: stated[name] for name in read}
-            said = (f"{n} = {v:.15g} ({names[n][0]}!{cell_name(*names[n][1:])})"
+            readings = (f"{n} = {v:.15g} ({names[n][0]}!{cell_name(*names[n][1:])})"
                     for n, v in read.items())  # fmt: skip
-            book.remarks.append(remark("table.beside_names", values=", ".join(said)))
+            book.remarks.append(remark("table.beside_names", values=", ".join(readings)))
     book.names.clear()
     book.names.update(names)
 
@@ -109,7 +109,7 @@ def read_setup(
     errors: list[CellError],
     *,
     decimal: Decimal | None,
-    given: Collection[str],
+    options: Collection[str],
 ) -> SurveySetup:
     """Return the values of `Setup`, complaining about what cannot be meant.
 
@@ -139,22 +139,28 @@ def read_setup(
     others = [name for k in other_numbers(count) for name in other_cells(k)]
     columns += [Column(name, kind="number") for name in others]
     values = read_named_values(
-        book, columns, sheet="Setup", decimal=decimal, errors=complaints, several=True, given=given
+        book,
+        columns,
+        sheet="Setup",
+        decimal=decimal,
+        errors=complaints,
+        several=True,
+        options=options,
     )
     where = f"{book.label} › Setup" if "Setup" in book.titles else book.label
     live = _formulas(book, values)
     defaults = {key for key in ("sigma_s", "sigma_r_max") if key in live}
     # Cells with the template's own formula are defaults, calculated or not.
-    told = [e for e in complaints if e.column not in live]
+    reported = [e for e in complaints if e.column not in live]
     number = {key: values.given(key) for key in numbers() if key not in defaults}
     further = {name: values.given(name) for name in others}
-    _check_positive(values, number | further, told)
-    media = _media(book, values, told)
-    d1, d2 = _distances(values, number, "d_1" in live, told)
-    unit = _unit(values, told)
+    _check_positive(values, number | further, reported)
+    media = _media(book, values, reported)
+    d1, d2 = _distances(values, number, "d_1" in live, reported)
+    unit = _unit(values, reported)
     # What options replace may hold anything, as all beside another pair that is not our workbook.
-    is_idle = "pair" in given and "d_1" not in book.names
-    errors.extend(e for e in told if not is_idle and e.column not in given)
+    is_idle = "pair" in options and "d_1" not in book.names
+    errors.extend(e for e in reported if not is_idle and e.column not in options)
     matrices, nadirs = _general(values)
     return SurveySetup(
         taking=_stated(
@@ -184,22 +190,22 @@ def read_setup(
     )
 
 
-def _stated(kind: type[Any], number: Mapping[str, float | None], **known: object) -> Any:
+def _stated(kind: type[Any], number: Mapping[str, float | None], **values: object) -> Any:
     """Return what numbers state of the taking or measuring, besides what is known."""
-    names = {f.name for f in fields(kind)} - known.keys()
-    return kind(**known, **{name: number.get(*cells_of([name])) for name in names})
+    names = {f.name for f in fields(kind)} - values.keys()
+    return kind(**values, **{name: number.get(*cells_of([name])) for name in names})
 
 
 def _adjusted(book: SheetFile) -> tuple[FloatArray | None, FloatArray | None]:
     """Return the corrections of both photos' coordinates, None where the workbook has none."""
-    found: list[FloatArray | None] = []
+    matrices: list[FloatArray | None] = []
     for image in (1, 2):
         names = adjustment_names(image)
         places = [book.names[name] for name in names if name in book.names]
         cells = [book.grid(sheet).rows.get(row, {}).get(column) for sheet, row, column in places]
         numbers = [cell for cell in cells if isinstance(cell, float)]
-        found.append(np.reshape(numbers, (3, 3)) if len(numbers) == len(names) else None)
-    return found[0], found[1]
+        matrices.append(np.reshape(numbers, (3, 3)) if len(numbers) == len(names) else None)
+    return matrices[0], matrices[1]
 
 
 def media_count(names: Collection[str]) -> int:
@@ -224,7 +230,7 @@ def _media(book: SheetFile, values: NamedValues, errors: list[CellError]) -> Sur
         elif z0 is None and any(index is not None for index in media.indices[1:]):
             complaints[name] = "is blank: type the way from the camera to the first interface [m]."
     faulty = {error.column for error in errors}
-    errors += [values.error(name, told) for name, told in complaints.items() if name not in faulty]
+    errors += [values.error(name, text) for name, text in complaints.items() if name not in faulty]
     return media
 
 
@@ -297,8 +303,8 @@ def _columns() -> list[Column]:
     columns = []
     media = media_names(MOST, leaning=True)
     for key in (*numbers(), *media, *lens_cells()[0], *_general_names(), *_TEXTS):
-        known = term("setup", key)
-        unit = known.unit if known is not None and key not in _TEXTS else ""
+        entry = term("setup", key)
+        unit = entry.unit if entry is not None and key not in _TEXTS else ""
         kind: Kind = "text" if key in _TEXTS else "number"
         columns.append(Column(key, headings("setup", key), kind=kind, unit=unit))
     return columns
@@ -314,7 +320,7 @@ def _text(values: NamedValues, key: str) -> str:
 
 def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     """Return which cells hold the template's own formula instead of a typed number."""
-    own = set()
+    typed = set()
     places = {
         name: f"{quoted_title(sheet)}!{fixed_cell(*place)}"
         for name, (sheet, *place) in book.names.items()
@@ -322,10 +328,10 @@ def _formulas(book: SheetFile, values: NamedValues) -> set[str]:
     for key in values.places.keys() & set(TYPED_FORMULAS):
         sheet, cell = values.places[key]
         # Those of older versions are a part of today's.
-        stands = _plain(with_names(book.formula(sheet, *split_cell(cell)), places))
-        if stands.startswith("if(") and stands in _plain(formulas()[key]):
-            own.add(key)
-    return own
+        formula = _plain(with_names(book.formula(sheet, *split_cell(cell)), places))
+        if formula.startswith("if(") and formula in _plain(formulas()[key]):
+            typed.add(key)
+    return typed
 
 
 def _plain(formula: str) -> str:

@@ -187,9 +187,9 @@ def _position(value: CellArray, area: CellArray, _: CellArray | None = None) -> 
         raise Unknown("MATCH in rows")
     keys = _places(area)
     parts = (value.kinds.ravel().tolist(), value.numbers.ravel().tolist(), value.texts.ravel())
-    found = [keys.get(t.casefold() if k == TEXT else n if k != ERROR else None, np.nan)
+    positions = [keys.get(t.casefold() if k == TEXT else n if k != ERROR else None, np.nan)
              for k, n, t in zip(*parts, strict=True)]  # fmt: skip
-    return number_cells(np.reshape(found, value.numbers.shape))
+    return number_cells(np.reshape(positions, value.numbers.shape))
 
 
 def _entry(area: CellArray, row: CellArray, column: CellArray | None = None) -> CellArray:

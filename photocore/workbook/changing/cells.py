@@ -287,7 +287,7 @@ class NewRows:
 
     def __post_init__(self) -> None:
         """Note the columns' values by their letters, as a sheet's XML names them."""
-        values = {column_letters(own.column).encode(): own.values for own in self.columns}
+        values = {column_letters(column.column).encode(): column.values for column in self.columns}
         object.__setattr__(self, "by_letters", values)
 
     def cells(self, row: int) -> dict[int, NewCell]:
@@ -315,8 +315,8 @@ class NewRows:
         The rows differ by little but their numbers, which take the places of marks all at once.
         """
         part = slice(rows.start - self.first, rows.stop - self.first)
-        own = range(self.first, self.first + self.size)
-        columns = [_column_xml(c, c.values[part], rows, prefix, own) for c in self.columns]
+        numbers = range(self.first, self.first + self.size)
+        columns = [_column_xml(c, c.values[part], rows, prefix, numbers) for c in self.columns]
         for row, cells in zip(rows, zip(*columns, strict=True), strict=True):
             yield "".join(cells).replace(ROW_MARK, str(row))
 

@@ -63,16 +63,18 @@ class SheetChanges:
 
     def grown(self, reference: str) -> str:
         """Return the stated extent of a sheet with the cells that are made."""
-        made = [(row, column) for row, own in self.inputs.items() for column in _ends(own)]
-        made += [(row, column) for row, own in self.placed.items() for column in _ends(own)]
+        cells = [(row, column) for row, columns in self.inputs.items() for column in _ends(columns)]
+        cells += [
+            (row, column) for row, columns in self.placed.items() for column in _ends(columns)
+        ]
         for block in self.added:
             numbers = [column.column for column in block.columns]
-            made += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
-        if not made or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
+            cells += [(block.first, min(numbers)), (block.first + block.size - 1, max(numbers))]
+        if not cells or not re.fullmatch(r"[A-Z]{1,3}\d+(:[A-Z]{1,3}\d+)?", reference):
             return reference
         area = top, left, bottom, right = split_area(reference)
-        top, left = min(top, *(r for r, _ in made)), min(left, *(c for _, c in made))
-        bottom, right = max(bottom, *(r for r, _ in made)), max(right, *(c for _, c in made))
+        top, left = min(top, *(r for r, _ in cells)), min(left, *(c for _, c in cells))
+        bottom, right = max(bottom, *(r for r, _ in cells)), max(right, *(c for _, c in cells))
         if (top, left, bottom, right) == area:
             return reference
         return f"{cell_name(top, left)}:{cell_name(bottom, right)}"
@@ -169,22 +171,22 @@ def column_edits(
     form = re.search(rb"<(?:\w+:)?sheetFormatPr\b", head)
     if form and b"outlineLevelCol" not in head and any(folded for _, folded in columns.values()):
         yield form.end(), form.end(), b' outlineLevelCol="1"'
-    known = re.search(rb"<(?:\w+:)?cols\b.*</(?:\w+:)?cols\s*>", head, re.DOTALL)
-    made = {}
-    for tag in re.findall(rb"<(?:\w+:)?col\s[^>]*>", known[0] if known else b""):
+    match = re.search(rb"<(?:\w+:)?cols\b.*</(?:\w+:)?cols\s*>", head, re.DOTALL)
+    widths = {}
+    for tag in re.findall(rb"<(?:\w+:)?col\s[^>]*>", match[0] if match else b""):
         low, high = (int(*re.findall(rb"\s%s=.(\d+)" % key, tag)) for key in (b"min", b"max"))
         for first, last in ((low, min(high, min(columns) - 1)), (max(low, max(columns) + 1), high)):
             if first <= last:
-                own = re.sub(rb"(\smin=.)\d+", rb"\g<1>%d" % first, tag)
-                own = re.sub(rb"(\smax=.)\d+", rb"\g<1>%d" % last, own)
-                made[first] = own.rstrip(b"/>") + b"/>"
+                changed = re.sub(rb"(\smin=.)\d+", rb"\g<1>%d" % first, tag)
+                changed = re.sub(rb"(\smax=.)\d+", rb"\g<1>%d" % last, changed)
+                widths[first] = changed.rstrip(b"/>") + b"/>"
     for column, (width, folded) in columns.items():
         fold = ' outlineLevel="1" hidden="1"' if folded else ""
         text = f'min="{column}" max="{column}" width="{width:g}" customWidth="1"{fold}'
-        made[column] = f"<{prefix}col {text}/>".encode()
-    whole = b"".join(tag for _, tag in sorted(made.items()))
+        widths[column] = f"<{prefix}col {text}/>".encode()
+    whole = b"".join(tag for _, tag in sorted(widths.items()))
     tags = b"<%scols>%s</%scols>" % (prefix.encode(), whole, prefix.encode())
-    yield (*(known.span() if known else (len(head), len(head))), tags)
+    yield (*(match.span() if match else (len(head), len(head))), tags)
 
 
 def _ends(columns: Collection[int]) -> tuple[int, ...]:

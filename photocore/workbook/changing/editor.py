@@ -227,9 +227,9 @@ class WorkbookEditor:
 
     def free_title(self, title: str) -> str:
         """Return a title, or one with a number if a sheet has it already."""
-        taken = {name.casefold() for name in self.titles}
+        titles = {name.casefold() for name in self.titles}
         names = (f"{title}{f' {number}' if number > 1 else ''}" for number in counted(1))
-        return next(name for name in names if name.casefold() not in taken)
+        return next(name for name in names if name.casefold() not in titles)
 
     def append_columns(
         self,
@@ -271,8 +271,8 @@ class WorkbookEditor:
         unknown = [name for name in (*inputs, *results) if name not in headings]
         if unknown:
             raise InputError(f'{where}: the table {area.name} has no column "{unknown[0]}".')
-        given = {name: _plain(values) for name, values in (*inputs.items(), *results.items())}
-        size = count or max((len(values) for values in given.values()), default=0)
+        cells = {name: _plain(values) for name, values in (*inputs.items(), *results.items())}
+        size = count or max((len(values) for values in cells.values()), default=0)
         new_rows = list(range(bottom + 1, bottom + 1 + size))
         if not new_rows:
             return []
@@ -285,7 +285,7 @@ class WorkbookEditor:
             like = model.get(column, formulas.ModelCell())
             formula = RowFormula(escape(like.formula), last).at if like.formula else None
             fits = name in (results if formula else inputs)
-            values = [*given[name]] if fits else []
+            values = [*cells[name]] if fits else []
             values += [None] * (size - len(values))
             columns.append(NewColumn(column, values, like.style, formula))
         self._changes(area.sheet).added.append(NewRows(bottom + 1, size, columns))
@@ -422,10 +422,10 @@ class WorkbookEditor:
             changes = self.changes.get(sheet.title)
             if changes:
                 read = partial(read_part, self.path, package, sheet.part)
-                made = splice_sheet(self.path, sheet.part, read(), changes, shared)
-                if not made.strips:
-                    made.written(strip=False)
-                spliced[sheet.title] = made
+                pieces = splice_sheet(self.path, sheet.part, read(), changes, shared)
+                if not pieces.strips:
+                    pieces.written(strip=False)
+                spliced[sheet.title] = pieces
         return spliced
 
     def _changes(self, title: str) -> SheetChanges:

@@ -61,10 +61,10 @@ def model_cells(
             if number > row:
                 break
             for column, cell in row_cells(element):
-                own = next((child for child in cell if local(child.tag) == "f"), None)
-                formula = "" if own is None else own.text or ""
-                if own is not None and own.get("t") == "shared":
-                    place, group = cell_name(number, column), own.get("si", "")
+                node = next((child for child in cell if local(child.tag) == "f"), None)
+                formula = "" if node is None else node.text or ""
+                if node is not None and node.get("t") == "shared":
+                    place, group = cell_name(number, column), node.get("si", "")
                     if formula:
                         shared[group] = Translator(f"={formula}", origin=place)
                     elif group in shared:
@@ -92,8 +92,8 @@ class References:
         stale = set(changed)
         if not stale:
             return stale
-        known = stale.union(settled)
-        others = [sheet for sheet in self.book.sheets if sheet.title not in known]
+        reached = stale.union(settled)
+        others = [sheet for sheet in self.book.sheets if sheet.title not in reached]
         texts = {sheet.title: self._formulas(sheet) for sheet in others}
         names = dict(self.book.names)
         while True:
@@ -148,10 +148,10 @@ class References:
                 self._replace(name, parts, area, bottom, tag=rb"f")
         self._replace(self.book.part, parts, area, bottom, tag=rb"definedName")
         last = re.compile(rb"![$]?[A-Z]+[$]?\d+:[$]?[A-Z]+[$]?%d\b" % area.area[2])
-        for other in self.book.sheets:
-            part = parts.held(other.part) or read_part(self.path, self.package, other.part)
+        for any_sheet in self.book.sheets:
+            part = parts.held(any_sheet.part) or read_part(self.path, self.package, any_sheet.part)
             if any(last.search(text) for _, text in windows(opened(part))):
-                self._replace(other.part, parts, area, bottom, tag=rb"f")
+                self._replace(any_sheet.part, parts, area, bottom, tag=rb"f")
 
     def _replace(
         self, name: str, parts: Parts, area: TableArea, bottom: int, *, tag: bytes
@@ -238,9 +238,9 @@ def areas_of_arrays(data: bytes) -> list[tuple[int, int, int, int]]:
     if not any(kind in data for kind in (b'"array"', b"'array'", b"dataTable")):
         return []
     tags = re.findall(rb"<(?:\w+:)?f\s[^>]*>", data)
-    found = [re.search(rb"\sref\s*=\s*[\"']([A-Z]+\d+:[A-Z]+\d+)[\"']", tag) for tag in tags]
+    matches = [re.search(rb"\sref\s*=\s*[\"']([A-Z]+\d+:[A-Z]+\d+)[\"']", tag) for tag in tags]
     kinds = [b"array" in tag or b"dataTable" in tag for tag in tags]
-    return [split_area(m[1].decode()) for m, kind in zip(found, kinds, strict=True) if m and kind]
+    return [split_area(m[1].decode()) for m, kind in zip(matches, kinds, strict=True) if m and kind]
 
 
 def charts_of(path: Path, package: zipfile.ZipFile, sheet: SheetPart) -> list[str]:

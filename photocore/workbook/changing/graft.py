@@ -72,19 +72,19 @@ class Graft:
         local : bool
             Whether a name that leads elsewhere already is defined anew for the sheet alone.
         """
-        other = _directory(self.path, content)
+        source = _directory(self.path, content)
         renumbered, conditional = self.styles.take_in(StyleSheet(content["xl/styles.xml"]))
         count = len(re.findall(rb"<(?:\w+:)?sheet\s", self._book()))
         places: dict[str, int] = {}
-        for sheet in other.sheets:
+        for sheet in source.sheets:
             if sheet.title in titles:
                 data = _restyled(content[sheet.part], renumbered, conditional)
                 part = self._add_part(sheet.part, {**content, sheet.part: data})
                 self._add_sheet(titles[sheet.title], part)
-                self._local_names(content[other.part], other, sheet, count, titles[sheet.title])
+                self._local_names(content[source.part], source, sheet, count, titles[sheet.title])
                 places[sheet.title] = count
                 count += 1
-        for name, reference in other.names.items():
+        for name, reference in source.names.items():
             written, _, place = reference.rpartition("!")
             title = plain_title(written)
             if title in titles:
@@ -107,20 +107,20 @@ class Graft:
             % re.escape(name.encode()),
             re.IGNORECASE,
         )
-        stands = pattern.search(data)
-        if stands is None:
+        match = pattern.search(data)
+        if match is None:
             self._add_name(f" name={quoted(name)}", reference)
-        elif anew or b"#REF!" in stands[1]:
-            start, end = stands.span(1)
+        elif anew or b"#REF!" in match[1]:
+            start, end = match.span(1)
             self._put(self.book.part, data[:start] + escaped(reference).encode() + data[end:])
         elif home is not None:
             self._add_name(f' name={quoted(name)} localSheetId="{home}"', reference)
 
     def _local_names(
-        self, data: bytes, other: Workbook, sheet: SheetPart, index: int, title: str
+        self, data: bytes, source: Workbook, sheet: SheetPart, index: int, title: str
     ) -> None:
         """Take over the names that belong to a sheet: rows printed on every page, print areas."""
-        place = [own.title for own in other.sheets].index(sheet.title)
+        place = [own.title for own in source.sheets].index(sheet.title)
         for match in re.finditer(rb"<definedName\s([^>]*)>([^<]*)</", data):
             attributes = match[1].decode()
             old, new = f'localSheetId="{place}"', f'localSheetId="{index}"'
@@ -182,8 +182,8 @@ class Graft:
     def _table_number(self) -> int:
         tables = [name for name in self._names if "/tables/" in name]
         pattern = re.compile(rb"<(?:\w+:)?table\b[^>]*?\sid\s*=\s*[\"'](\d+)")
-        found = [pattern.search(self._now(name)) for name in tables if name.endswith(".xml")]
-        return max([0, *(int(match[1]) for match in found if match)]) + 1
+        matches = [pattern.search(self._now(name)) for name in tables if name.endswith(".xml")]
+        return max([0, *(int(match[1]) for match in matches if match)]) + 1
 
     def _relate(self, part: str, target: str, kind: str, key: str = "") -> str:
         """Relate two parts; return the relation's id."""
@@ -192,8 +192,8 @@ class Graft:
         if name not in self._names:
             self._put(name, f'<Relationships xmlns="{_PACKAGE}"></Relationships>'.encode())
         if not key:
-            taken = {m.decode() for m in re.findall(rb"\sId\s*=\s*[\"']([^\"']*)", self._now(name))}
-            key = next(f"rId{n}" for n in range(1, 10**6) if f"rId{n}" not in taken)
+            ids = {m.decode() for m in re.findall(rb"\sId\s*=\s*[\"']([^\"']*)", self._now(name))}
+            key = next(f"rId{n}" for n in range(1, 10**6) if f"rId{n}" not in ids)
         about = f'Id="{key}" Type="{_RELATIONS}/{kind}" Target="/{target}"'
         self._append(name, "Relationships", f"<:Relationship {about}/>")
         return key
@@ -211,8 +211,8 @@ class Graft:
         if place is None:
             raise InputError(f"{self.path}: damaged, the part {part} cannot be understood.")
         prefixed = element.replace("<:", f"<{(place[1] or b'').decode()}", 1)
-        made = self._strict(prefixed.encode())
-        self._put(part, data[: place.start()] + made + data[place.start() :])
+        content = self._strict(prefixed.encode())
+        self._put(part, data[: place.start()] + content + data[place.start() :])
 
     def _strict(self, data: bytes) -> bytes:
         """Return a part in the words of a strict workbook if this is one."""

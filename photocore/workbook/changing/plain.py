@@ -80,7 +80,9 @@ class PlainEditor(WorkbookEditor):
         super().fill_rows(title, first, list(map(self._plain, columns)))
 
     def _plain(self, column: NewColumn) -> NewColumn:
-        own, plain = column.formula, self._formulas.plain
-        if own is None:
+        formula, plain = column.formula, self._formulas.plain
+        if formula is None:
             return column
-        return column._replace(formula=lambda r: plain(own if isinstance(own, str) else own(r), r))
+        return column._replace(
+            formula=lambda r: plain(formula if isinstance(formula, str) else formula(r), r)
+        )

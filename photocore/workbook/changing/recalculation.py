@@ -54,7 +54,7 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     """
     stored, broken = open_xlsx(path, max_rows=_ROWS), package_faults(path)
     faults = broken or sorted(lost_references(path))
-    cells = [(t, *found) for t in stored.titles for found in _FORMULA.findall(stored.text(t))]
+    cells = [(t, *formula) for t in stored.titles for formula in _FORMULA.findall(stored.text(t))]
     differ: dict[str, tuple[str, str]] = {}
     unknown: list[str] = []
     blank = 0
@@ -81,21 +81,21 @@ def examine(path: Path, program: str | None) -> dict[str, Any]:
     return {"faults": faults, **counted, "differ": differ, "unknown": unknown}
 
 
-def examination_lines(found: Mapping[str, Any], program: str | None) -> list[str]:
+def examination_lines(facts: Mapping[str, Any], program: str | None) -> list[str]:
     """Return what `examine` found for people."""
-    blank = f", {found['not_calculated']} without a result yet" if found["not_calculated"] else ""
-    lines = [*found["faults"], f"{found['formulas']} formulas{blank}"]
+    blank = f", {facts['not_calculated']} without a result yet" if facts["not_calculated"] else ""
+    lines = [*facts["faults"], f"{facts['formulas']} formulas{blank}"]
     if program is None:
         return [*lines, "LibreOffice is not installed: nothing was calculated anew"]
     lines += [
-        f"{cell}: stored {old}, calculated {new}" for cell, (old, new) in found["differ"].items()
+        f"{cell}: stored {old}, calculated {new}" for cell, (old, new) in facts["differ"].items()
     ]
-    if found["unknown"]:
-        cells = ", ".join(found["unknown"][:9])
+    if facts["unknown"]:
+        cells = ", ".join(facts["unknown"][:9])
         lines.append(
-            f"LibreOffice does not know the functions of {len(found['unknown'])} cells: {cells}"
+            f"LibreOffice does not know the functions of {len(facts['unknown'])} cells: {cells}"
         )
-    return [*lines, f"{len(found['differ'])} cells differ when calculated anew"]
+    return [*lines, f"{len(facts['differ'])} cells differ when calculated anew"]
 
 
 def strip_results(source: Path, target: Path) -> Path:
@@ -112,8 +112,8 @@ def strip_results(source: Path, target: Path) -> Path:
 def _converted(path: Path, folder: Path, program: str) -> Path:
     """Return a copy that LibreOffice calculated: it trusts stored results, so they are left out."""
     bare, out = strip_results(path, folder / f"bare{path.suffix}"), folder / "out"
-    own = f"-env:UserInstallation={(folder / 'profile').as_uri()}"
-    words = [program, own, "--headless", "--norestore", "--convert-to", "xlsx", "--outdir"]
+    profile = f"-env:UserInstallation={(folder / 'profile').as_uri()}"
+    words = [program, profile, "--headless", "--norestore", "--convert-to", "xlsx", "--outdir"]
     run = subprocess.run([*words, str(out), str(bare)], capture_output=True, text=True, check=False)
     if not (out / "bare.xlsx").exists():
         raise InputError(f"{path}: LibreOffice made nothing of it: {run.stderr.strip():.200}")

@@ -159,14 +159,14 @@ def put_result_columns(
 
 
 def _free_columns(
-    editor: WorkbookEditor, table: OwnTable, taken: Collection[int], count: int
+    editor: WorkbookEditor, table: OwnTable, occupied: Collection[int], count: int
 ) -> int:
     """Return the first of so many free columns that stand together, right of those that are taken.
 
     Free of all cells, not of those of the table alone: some columns of results are folded away.
     """
     used = {column for cells in editor.grid(table.sheet).rows.values() for column in cells}
-    first = max(taken, default=0) + 1
+    first = max(occupied, default=0) + 1
     for column in sorted(column for column in used if column >= first):
         if column - first >= count:
             break

@@ -85,7 +85,7 @@ def _normal(text: bytes) -> str:
 
 
 def _deviating(
-    found: Mapping[tuple[int, int], str], columns: Collection[Column]
+    formulas: Mapping[tuple[int, int], str], columns: Collection[Column]
 ) -> list[tuple[int, int]]:
     """Return which cells with other formulas are among results.
 
@@ -94,16 +94,16 @@ def _deviating(
     """
     rows: dict[Column, list[tuple[int, int]]] = {}
     for column, first, last in columns:
-        own = [at for at in found if at[1] == column and first <= at[0] <= last]
-        if own:
-            rows[column, first, last] = own
+        cells = [at for at in formulas if at[1] == column and first <= at[0] <= last]
+        if cells:
+            rows[column, first, last] = cells
     long = [one for one in columns if one[2] > one[1]]
-    whole = [c for c, own in rows.items() if c in long and len(own) > (c[2] - c[1] + 1) / 2]
+    whole = [c for c, cells in rows.items() if c in long and len(cells) > (c[2] - c[1] + 1) / 2]
     if 2 * len(whole) > len(long):
         for place in whole:
-            most = Counter(found[at] for at in rows[place]).most_common(1)[0][0]
-            rows[place] = [at for at in rows[place] if found[at] != most]
-    return [at for own in rows.values() for at in own]
+            most = Counter(formulas[at] for at in rows[place]).most_common(1)[0][0]
+            rows[place] = [at for at in rows[place] if formulas[at] != most]
+    return [at for cells in rows.values() for at in cells]
 
 
 @dataclass(slots=True)
@@ -125,13 +125,13 @@ class Settling:
     def __call__(self, path: Path, parts: Parts) -> Parts:
         """Return the parts of a workbook with the results that its formulas give."""
         with tempfile.TemporaryDirectory() as folder:
-            made = Path(folder) / path.name
-            rewrite_package(path, made, parts)
-            editor = WorkbookEditor(made)
+            result = Path(folder) / path.name
+            rewrite_package(path, result, parts)
+            editor = WorkbookEditor(result)
             try:
-                book = Calculation(load_workbook(made))
+                book = Calculation(load_workbook(result))
             except (ValueError, TypeError, KeyError, AttributeError, IndexError, BadZipFile) as why:
-                self.unknown[type(why).__name__] = made.name
+                self.unknown[type(why).__name__] = result.name
                 return parts
             formulas = book.formulas()[:MOST]
             for sheet, row, column in formulas:

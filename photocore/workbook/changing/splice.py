@@ -134,12 +134,12 @@ class _Splicer:
         self.parser.Parse(self.data[:start], False)
         self.inside, self.prefix = False, ""
         filler = FormFiller(self.changes)
-        for found in plain_rows(self.data, start, end):
+        for plain in plain_rows(self.data, start, end):
             if len(self.edits) > _HELD:
                 self.spill()
-            if found.form is not None and self.fill_formed(filler, found):
+            if plain.form is not None and self.fill_formed(filler, plain):
                 continue
-            row = with_cells(self.data, found)
+            row = with_cells(self.data, plain)
             self.start_row(row.number, row.start, "")
             new, cached, before = self.new, self.cached, 0
             for cell in row.cells:
@@ -325,8 +325,8 @@ class _Splicer:
         if area is None or b"shared" not in tag:
             return area is not None
         top, left, bottom, right = split_area(area[1].decode())
-        own = [self.changes.placed.get(row, {}) for row in range(top, bottom + 1)]
-        return not all(column in cells for cells in own for column in range(left, right + 1))
+        placed = [self.changes.placed.get(row, {}) for row in range(top, bottom + 1)]
+        return not all(column in cells for cells in placed for column in range(left, right + 1))
 
     def is_of_array(self) -> bool:
         """Whether this cell holds a result of a formula that stands in another one."""
@@ -339,8 +339,8 @@ class _Splicer:
         if new.rule != "over" or not text:
             return False
         start = self.tag_end(place[0])
-        stands = self.data[start : max(start, self.data.rfind(b"<", start, place[1]))]
-        return unescaped(stands.decode("utf-8")) == unescaped(text)
+        present = self.data[start : max(start, self.data.rfind(b"<", start, place[1]))]
+        return unescaped(present.decode("utf-8")) == unescaped(text)
 
     def put_result(self, name: str, value: CellValue) -> None:
         """Give this cell's formula another cached result."""
@@ -394,7 +394,7 @@ class _Splicer:
 
     def child(self, kind: str) -> tuple[int, int] | None:
         """Return where a direct child of this cell lies."""
-        places = ((start, end) for own, start, end in self.children if own == kind)
+        places = ((start, end) for name, start, end in self.children if name == kind)
         return next(places, None)
 
     def add_cells(self, before: int, place: tuple[int, int, str, str]) -> None:
@@ -420,16 +420,16 @@ class _Splicer:
             lines = map(self.row_xml, rows)
         tag = f"{self.prefix}row"
         pieces = zip(rows, lines, strict=True)
-        made = bytearray()  # rows of a large sheet are never held one by one
+        added = bytearray()  # rows of a large sheet are never held one by one
         start, end, opening, closing = place
         for number, xml in pieces:
             if xml:
-                if len(made) > _PIECE:
-                    self.insert(made, (start, end, opening, ""))
+                if len(added) > _PIECE:
+                    self.insert(added, (start, end, opening, ""))
                     self.spill()
-                    made, opening = bytearray(), ""
-                made += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
-        self.insert(made, (start, end, opening, closing))
+                    added, opening = bytearray(), ""
+                added += f'<{tag} r="{number}">{xml}</{tag}>'.encode()
+        self.insert(added, (start, end, opening, closing))
 
     def row_xml(self, row: int) -> str:
         """Return the XML of the cells of a new row."""

@@ -63,7 +63,7 @@ class StyleSheet:
         entry.set("applyNumberFormat", "1")
         return str(self.append("cellXfs", entry))
 
-    def take_in(self, other: StyleSheet) -> tuple[Callable[[int], int], int]:
+    def take_in(self, source: StyleSheet) -> tuple[Callable[[int], int], int]:
         """Add all formats of another style sheet.
 
         Returns
@@ -74,12 +74,12 @@ class StyleSheet:
             What the numbers of its conditional formats (dxf) grow by.
         """
         moved = {
-            section: [self.append(section, _copied(e)) for e in other.sections.get(section, ())]
+            section: [self.append(section, _copied(e)) for e in source.sections.get(section, ())]
             for section in ("fonts", "fills", "borders")
         }
-        codes = {number: code for code, number in other.formats.items()}
+        codes = {number: code for code, number in source.formats.items()}
         styles = []
-        for entry in other.sections.get("cellXfs", ()):
+        for entry in source.sections.get("cellXfs", ()):
             copy = _copied(entry)
             for key, section in (("fontId", "fonts"), ("fillId", "fills"), ("borderId", "borders")):
                 copy.set(key, str(moved[section][int(entry.get(key, "0"))]))
@@ -89,7 +89,7 @@ class StyleSheet:
             copy.set("xfId", "0")
             styles.append(self.append("cellXfs", copy))
         first = len(self.sections.get("dxfs", ())) + len(self.added.get("dxfs", ()))
-        for entry in other.sections.get("dxfs", ()):
+        for entry in source.sections.get("dxfs", ()):
             self.append("dxfs", _copied(entry))
         return styles.__getitem__, first
 
@@ -128,13 +128,13 @@ def _inserted(data: bytes, section: str, text: bytes, total: int) -> bytes:
         place = re.search(rb"<(?:\w+:)?(?:" + later + rb")\b|</(?:\w+:)?styleSheet\s*>", data)
         prefix = (root and root["prefix"]) or b""
         start = place.start() if place else len(data)
-        made = b'<%s%s count="%d">%s</%s%s>' % (prefix, name, total, text, prefix, name)
-        return data[:start] + made + data[start:]
+        element = b'<%s%s count="%d">%s</%s%s>' % (prefix, name, total, text, prefix, name)
+        return data[:start] + element + data[start:]
     prefix = opening["prefix"] or b""
     tag = re.sub(rb"""(\scount\s*=\s*["'])\d+""", rb"\g<1>%d" % total, opening[0])
     if opening["closed"]:
         tag = tag[:-2].rstrip() + b">"
-        made = tag + text + b"</%s%s>" % (prefix, name)
-        return data[: opening.start()] + made + data[opening.end() :]
+        element = tag + text + b"</%s%s>" % (prefix, name)
+        return data[: opening.start()] + element + data[opening.end() :]
     end = data.index(b"</%s%s" % (prefix, name), opening.end())
     return data[: opening.start()] + tag + data[opening.end() : end] + text + data[end:]

@@ -126,14 +126,14 @@ class FormulaBook:
         rows : str
             Which list of the section.
         """
-        own, shared = self.content[table], self.content
-        every = ChainMap(dict(parts or {}), own.get("parts", {}), shared["parts"])
+        lines, shared = self.content[table], self.content
+        every = ChainMap(dict(parts or {}), lines.get("parts", {}), shared["parts"])
         formulas = _Formulas(
             facts,
             {name: chosen(text, facts) for name, text in every.items()},
-            ChainMap(own.get("rows", {}), shared.get("rows", {})),
+            ChainMap(lines.get("rows", {}), shared.get("rows", {})),
         )
-        return tuple(formulas.expanded(own[rows], ()))
+        return tuple(formulas.expanded(lines[rows], ()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,32 +145,38 @@ class _Formulas:
     rows: Mapping[str, Sequence[Mapping[str, Any]]]
 
     def expanded(
-        self, rows: Iterable[Mapping[str, Any]], given: Sequence[str]
+        self, rows: Iterable[Mapping[str, Any]], arguments: Sequence[str]
     ) -> Iterator[LiveColumn]:
         """Yield the columns of some rows."""
         for row in rows:
             if not holds(row.get("when", ""), self.facts):
                 continue
-            words = self.filled(row["each"], given).split() if "each" in row else [None]
+            words = self.filled(row["each"], arguments).split() if "each" in row else [None]
             for word in words:
-                own = given if word is None else (word, *(word.split(":") if ":" in word else word))
+                arguments_of_row = (
+                    arguments
+                    if word is None
+                    else (word, *(word.split(":") if ":" in word else word))
+                )
                 if "rows" in row:
-                    yield from self.expanded(self.rows[row["rows"]], own)
+                    yield from self.expanded(self.rows[row["rows"]], arguments_of_row)
                 else:
-                    yield self._column(row, own)
+                    yield self._column(row, arguments_of_row)
 
-    def _column(self, row: Mapping[str, Any], given: Sequence[str]) -> LiveColumn:
+    def _column(self, row: Mapping[str, Any], arguments: Sequence[str]) -> LiveColumn:
         values = {n: chosen(v, self.facts) for n, v in row.items() if n not in ("when", "each")}
         values = {name: value for name, value in values.items() if value is not None}
         for name in ("key", "label", "formula"):
-            values[name] = self.filled(values.get(name, "{0}" if name == "key" else ""), given)
+            values[name] = self.filled(values.get(name, "{0}" if name == "key" else ""), arguments)
         if "limits" in values:
             values["limits"] = tuple(values["limits"])
         return LiveColumn(**{"kind": "formula" if values["formula"] else "input", **values})
 
-    def filled(self, text: str, given: Sequence[str] = ()) -> str:
+    def filled(self, text: str, arguments: Sequence[str] = ()) -> str:
         """Return a formula with what is given, and its parts, in their places."""
-        text = _GIVEN.sub(lambda m: given[int(m[1])] if int(m[1]) < len(given) else "", text)
+        text = _GIVEN.sub(
+            lambda m: arguments[int(m[1])] if int(m[1]) < len(arguments) else "", text
+        )
         while match := _PART.search(text):
             name, *own = match[1].split()
             part = self.filled(self.parts[name], (name, *own))
@@ -186,9 +192,9 @@ def chosen(value: Any, facts: Collection[str]) -> Any:
     """Return a value, of a table of values the first whose facts hold; None if none do."""
     if not isinstance(value, dict):
         return value
-    return next((text for wanted, text in value.items() if holds(wanted, facts)), None)
+    return next((text for condition, text in value.items() if holds(condition, facts)), None)
 
 
-def holds(wanted: str, facts: Collection[str]) -> bool:
+def holds(condition: str, facts: Collection[str]) -> bool:
     """Tell whether facts hold, and those after "!" do not."""
-    return all((word.lstrip("!") in facts) != word.startswith("!") for word in wanted.split())
+    return all((word.lstrip("!") in facts) != word.startswith("!") for word in condition.split())

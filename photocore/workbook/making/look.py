@@ -161,22 +161,22 @@ def break_columns(sheet: Worksheet, last: int, *, scale: int, before: Sequence[i
     space = 72 * (_LONG - 2 * _MARGIN) / (scale / 100)
     sheet.col_breaks = ColBreak()
     first = used = width_of(sheet, 1)
-    wanted = False
+    is_due = False
     for column in range(2, last + 1):
         width = width_of(sheet, column)
-        wanted |= column in before
-        if width and (used + width > space or wanted):
+        is_due |= column in before
+        if width and (used + width > space or is_due):
             sheet.col_breaks.append(Break(id=column - 1))
-            used, wanted = first, False
+            used, is_due = first, False
         used += width
 
 
 def width_of(sheet: Worksheet, column: int) -> float:
     """Return the width of a column on paper at full scale, zero where it is hidden. [pt]"""
-    known = sheet.column_dimensions.get(get_column_letter(column))
-    if known is None:
+    dimension = sheet.column_dimensions.get(get_column_letter(column))
+    if dimension is None:
         return 13 * _DIGIT
-    return 0.0 if known.hidden else known.width * _DIGIT
+    return 0.0 if dimension.hidden else dimension.width * _DIGIT
 
 
 def guard(sheet: Worksheet) -> None:

@@ -95,10 +95,10 @@ class RowBlock:
         return changes
 
     def _formula(self, index: int, text: str) -> str | RowText:
-        own = self.formulas.get(index)
-        if own is None:
+        formula = self.formulas.get(index)
+        if formula is None:
             return escape(text)
-        return own.escaped(shared=not re.search(r"[!\[]", own.text))
+        return formula.escaped(shared=not re.search(r"[!\[]", formula.text))
 
 
 def finish_book(
@@ -162,8 +162,8 @@ def _finished(
                     # openpyxl writes 16 digits; doubles need up to 17.
                     changes.cached.setdefault(row, {})[column] = _result(value)
             data = read_part(named, package, sheet.part)
-            made = splice_sheet(named, sheet.part, data, changes)
-            parts[sheet.part] = made.written(strip=False)
+            spliced = splice_sheet(named, sheet.part, data, changes)
+            parts[sheet.part] = spliced.written(strip=False)
         parts[_CORE] = _stated_properties(read_part(named, package, _CORE))
         for name in package.namelist():
             if name not in parts:
@@ -200,15 +200,15 @@ def _stated_properties(core: bytes) -> bytes:
     core = re.sub(
         rb"<dc:description[^>]*/>|<dc:description\b.*?</dc:description>", b"", core, flags=re.S
     )
-    made = provenance()
-    if not made.command:
+    origin = provenance()
+    if not origin.command:
         # An empty form written from Python says the same whatever the day.
         return core
-    said = escape(without_control("\n".join(made.lines())))
+    text = escape(without_control("\n".join(origin.lines())))
     # Without lxml openpyxl declares the prefix for the whole part, with it in each element. The
     # order of the elements is free; the last one closes the part.
-    told = f'<dc:description xmlns:dc="{_DUBLIN_CORE}">{said}</dc:description>'.encode()
-    return core.replace(b"</cp:coreProperties>", told + b"</cp:coreProperties>")
+    element = f'<dc:description xmlns:dc="{_DUBLIN_CORE}">{text}</dc:description>'.encode()
+    return core.replace(b"</cp:coreProperties>", element + b"</cp:coreProperties>")
 
 
 def _typed(value: CellValue) -> CellValue:
@@ -275,7 +275,7 @@ def check_new_workbook(
     *,
     overwrite: bool,
     source: Path | str | None = None,
-    other: str = "-result",
+    suffix: str = "-result",
 ) -> Path:
     """Return path if a workbook or another file may be written there; call it before long work.
 
@@ -287,7 +287,7 @@ def check_new_workbook(
         Replace an existing file.
     source : path, optional
         A workbook that may be changed in place.
-    other : str
+    suffix : str
         What the name of another file, which is proposed, ends in.
 
     Raises
@@ -301,7 +301,7 @@ def check_new_workbook(
     in_place = in_place and path.samefile(source or path)
     is_book = path.suffix.lower() in (".xlsx", ".xlsm") and path.is_file()
     if is_book and not in_place and not is_untouched(path):
-        stem = path.stem if other and path.stem.endswith(other) else f"{path.stem}{other}"
+        stem = path.stem if suffix and path.stem.endswith(suffix) else f"{path.stem}{suffix}"
         raise InputError(
             remark("book.not_ours", of=path, name=free_path(path.parent, stem, path.suffix).name)
         )

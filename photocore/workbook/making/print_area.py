@@ -33,10 +33,10 @@ def move_print_area(editor: WorkbookEditor, title: str, before: int, after: int)
     names = "|".join(re.escape(escaped(name)) for name in (quoted_title(title), title))
     tag = r"<(?:\w+:)?definedName\s[^>]*_xlnm\.Print_Area[^>]*>"
     area = rf"(?:{names})!\$[A-Z]+\$\d+:\$[A-Z]+\${before}<"
-    found = re.search((tag + area).encode(), data)
-    if found is None:
+    match = re.search((tag + area).encode(), data)
+    if match is None:
         return False
     if after != before:
-        moved = found[0][: -len(f"{before}<")] + f"{after}<".encode()
-        editor.texts.append((editor.book.part, found[0], moved))
+        moved = match[0][: -len(f"{before}<")] + f"{after}<".encode()
+        editor.texts.append((editor.book.part, match[0], moved))
     return True

@@ -72,8 +72,8 @@ class WordBook:
 
     def prompt(self, key: str, language: str) -> str:
         """Return what a cell says when it is chosen: its own prompt, or its column's label."""
-        known = self.term("prompts", key)
-        return known.in_language(language) if known else self.label(key, language)
+        entry = self.term("prompts", key)
+        return entry.in_language(language) if entry else self.label(key, language)
 
     def readme(self, language: str) -> list[str]:
         """Return the paragraphs of the sheet `Readme`; "#" marks a heading."""

@@ -131,14 +131,14 @@ def check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
 
 def check_names(refuse: str, members: list[zipfile.ZipInfo]) -> None:
     """Refuse, in words that begin so, members that lie outside their package or are there twice."""
-    seen = set()
+    names = set()
     for member in members:
         name = member.filename
         if name.startswith(("/", "\\")) or ".." in name.replace("\\", "/").split("/"):
             raise InputError(f"{refuse}the part {name!r:.80} lies outside the package.")
-        if name in seen:
+        if name in names:
             raise InputError(f"{refuse}it holds the part {name!r:.80} twice.")
-        seen.add(name)
+        names.add(name)
 
 
 def read_part(path: Path, package: zipfile.ZipFile, name: str) -> bytes:
@@ -227,8 +227,8 @@ def rewrite_package(
                 copy.external_attr, copy.create_system = info.external_attr, info.create_system
                 data = read_part(named, old, info.filename) if data is None else data
                 _write(new, copy, data)
-            known = {info.filename for info in listed}
-            for name in [name for name in parts if name not in known]:
+            names = {info.filename for info in listed}
+            for name in [name for name in parts if name not in names]:
                 added = zipfile.ZipInfo(name, date or NEW_PART_TIME)
                 added.compress_type = zipfile.ZIP_DEFLATED
                 added.external_attr = 0o600 << 16
@@ -249,14 +249,14 @@ def _write(package: zipfile.ZipFile, info: zipfile.ZipInfo, part: bytes | IO[byt
 def _refuse_damage(path: Path, old: zipfile.ZipFile, target: Path, changed: Parts) -> None:
     """Refuse changed parts that are no XML or refer to what is not there, unless they did so."""
     with zipfile.ZipFile(target) as new:
-        found = _faults(path, new, changed, changed)
-        fault = next((f for f in found if f not in {*_faults(path, old, changed, Parts())}), "")
+        faults = _faults(path, new, changed, changed)
+        fault = next((f for f in faults if f not in {*_faults(path, old, changed, Parts())}), "")
     if fault:
         raise InputError(remark("book.would_not_open", of=path, fault=fault))
 
 
 def _faults(
-    path: Path, package: zipfile.ZipFile, changed: Container[str], made: Parts
+    path: Path, package: zipfile.ZipFile, changed: Container[str], parts: Parts
 ) -> Iterator[str]:
     """Yield why a spreadsheet program would not open a package; parts at hand are not unpacked."""
     names = {*package.namelist()}
@@ -265,7 +265,7 @@ def _faults(
         try:
             relations = read_relations(path, package, name)
             if name in changed and name.endswith(".xml"):
-                part = made.held(name)
+                part = parts.held(name)
                 keys, start = _looked_through(opened(part) if part else package.open(name))
         except (InputError, expat.ExpatError) as error:
             yield f"{name} is not valid XML: {str(error).partition(': line')[0]}"
@@ -293,8 +293,8 @@ def _looked_through(part: IO[bytes]) -> tuple[set[bytes], bytes]:
         prefixes.update(_REFERENCES.findall(text))
         for prefix in prefixes:
             # What begins with plain letters is found ten times as quickly.
-            own = rb"%s:(?<=\s%s:)(?:id|embed|link)=[\"']([^\"']+)[\"']" % (prefix, prefix)
-            keys.update(re.findall(own, text))
+            pattern = rb"%s:(?<=\s%s:)(?:id|embed|link)=[\"']([^\"']+)[\"']" % (prefix, prefix)
+            keys.update(re.findall(pattern, text))
     parser.Parse(b"", True)
     return keys, start
 
@@ -316,9 +316,9 @@ def read_relations(path: Path, package: zipfile.ZipFile, part: str) -> dict[str,
                 # An absolute target replaces the folder.
                 whole = posixpath.join("/", folder, element.get("Target", ""))
                 kind = element.get("Type", "").rpartition("/")[2]
-                found = kind, posixpath.normpath(whole).lstrip("/")
+                relation = kind, posixpath.normpath(whole).lstrip("/")
                 external = element.get("TargetMode") == "External"
-                relations[element.get("Id", "")] = ("", "") if external else found
+                relations[element.get("Id", "")] = ("", "") if external else relation
     return relations
 
 

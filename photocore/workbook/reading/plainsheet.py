@@ -224,7 +224,7 @@ def _layout(cell: re.Match[bytes]) -> tuple[bytes, bytes | None, bytes | None, b
 
 def _form(data: bytes, body: int, cells: list[re.Match[bytes]], end: int) -> RowForm | None:
     """Return the form of a row from its body to its end; None where that would be of no use."""
-    found: list[FormCell] = []
+    form: list[FormCell] = []
     source, position = [_OPENING, b"("], body
     for cell in cells:
         letters, style, kind, has_formula, head, most = _layout(cell)
@@ -244,8 +244,8 @@ def _form(data: bytes, body: int, cells: list[re.Match[bytes]], end: int) -> Row
             characters = b"[^<]*+" if most == "any" else b"[^<]++"
             source += [re.escape(data[position:text]), b")(", characters, b")("]
             position = data.index(b"<", text)
-            found.append(FormCell(letters, style, kind, has_formula, is_inline))
+            form.append(FormCell(letters, style, kind, has_formula, is_inline))
     source += [re.escape(data[position:end]), b")"]
-    if not found or len({cell[1] for cell in cells}) < len(cells):
+    if not form or len({cell[1] for cell in cells}) < len(cells):
         return None
-    return RowForm(re.compile(b"".join(source)), tuple(found))
+    return RowForm(re.compile(b"".join(source)), tuple(form))

@@ -32,12 +32,12 @@ def lost_references(path: Path) -> set[str]:
         return set(_lost(path, package))
 
 
-def refuse_lost(made: Path, before: Path | None = None) -> None:
+def refuse_lost(result: Path, before: Path | None = None) -> None:
     """Refuse a workbook whose formulas have lost what they name.
 
     Parameters
     ----------
-    made : Path
+    result : Path
         As written, not yet in its place.
     before : Path, optional
         What it was made of, whose own faults stay.
@@ -47,11 +47,11 @@ def refuse_lost(made: Path, before: Path | None = None) -> None:
     InputError
         Naming the formula.
     """
-    lost = lost_references(made)
+    lost = lost_references(result)
     if lost and before is not None:
         lost -= lost_references(before)
     if lost:
-        raise InputError(f"{before or made}: nothing was written, since {min(lost)}.")
+        raise InputError(f"{before or result}: nothing was written, since {min(lost)}.")
 
 
 def _lost(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
@@ -63,7 +63,7 @@ def _lost(path: Path, package: zipfile.ZipFile) -> Iterator[str]:
     }
     whole = read_part(path, package, book.part)
     titles = {title.casefold() for title in _titles(whole)}
-    names = {unescaped(own.decode()).casefold() for own in _DEFINED.findall(whole)}
+    names = {unescaped(match.decode()).casefold() for match in _DEFINED.findall(whole)}
     for sheet in book.sheets:
         with package.open(sheet.part) as part:
             formulas = set(FORMULA.findall(part.read(_FORMS)))
@@ -92,6 +92,6 @@ def _references(formula: bytes) -> tuple[list[str], list[tuple[str, str]], list[
 
 def _titles(book: bytes) -> Iterator[str]:
     for tag in re.findall(rb"<(?:\w+:)?sheet\s[^>]*>", book):
-        found = re.search(rb"\sname\s*=\s*(?:\"([^\"]*)\"|'([^']*)')", tag)
-        if found:
-            yield unescaped((found[1] or found[2] or b"").decode())
+        match = re.search(rb"\sname\s*=\s*(?:\"([^\"]*)\"|'([^']*)')", tag)
+        if match:
+            yield unescaped((match[1] or match[2] or b"").decode())

@@ -219,7 +219,7 @@ def _table(title: str, part: str, root: Element) -> TableArea:
 
 def part_of_kind(package: zipfile.ZipFile, book: Workbook, kind: str) -> str:
     """Return the one part of a workbook of a kind, empty where it has none."""
-    part = next((target for own, target in book.relations.values() if own == kind), "")
+    part = next((target for relation, target in book.relations.values() if relation == kind), "")
     return part if part in package.namelist() else ""
 
 
@@ -256,7 +256,7 @@ def _date_styles(path: Path, package: zipfile.ZipFile, book: Workbook) -> dict[s
                 codes[int(element.get("numFmtId", "0"))] = element.get("formatCode", "")
             elif kind == "cellXfs":
                 cells += [
-                    int(own.get("numFmtId", "0")) for own in element if local(own.tag) == "xf"
+                    int(style.get("numFmtId", "0")) for style in element if local(style.tag) == "xf"
                 ]
     dates = {n: code for n, code in codes.items() if is_date_format(code) or _NAMED(code)}
     return {str(index): dates[number] for index, number in enumerate(cells) if number in dates}
