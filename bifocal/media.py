@@ -18,7 +18,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -32,6 +32,14 @@ from photocore.camera.rotation import by_rotation
 PLACING = ("z0", "lean X", "lean Y", "lean Z")
 #: A point on the last interface is behind it, whatever the last digit says. Relative.
 _ROUNDING = 1e-14
+
+
+class MediaOfPhoto(TypedDict, total=False):
+    """What a photo states of the media before its camera; nothing in air."""
+
+    layers: Layers | None
+    z0: float | None
+    interface_normal: FloatArray | None
 
 
 class ObjectRays(NamedTuple):

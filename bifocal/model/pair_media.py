@@ -14,7 +14,7 @@ from math import atan2
 import numpy as np
 
 from bifocal import rays
-from bifocal.media import MediaPath, interface_axes, view
+from bifocal.media import MediaOfPhoto, MediaPath, interface_axes, view
 from bifocal.model.orientation_precision import (
     CAMERA,
     NAMES,
@@ -24,7 +24,7 @@ from bifocal.model.orientation_precision import (
     rates_of,
 )
 from bifocal.model.pair import Pair
-from bifocal.model.photo import AXIS, MediaOfPhoto
+from bifocal.model.photo import AXIS
 from bifocal.rays import Foot, foot_of, straight
 from bifocal.remarks import remark
 from multimedia import Layers

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,14 +38,6 @@ LEAST_COSINE = 0.1
 AXIS = "axis"
 #: What else it holds where the pair file has `layers`.
 _MEDIA = ("z0", "interface_normal")
-
-
-class MediaOfPhoto(TypedDict, total=False):
-    """What a photo states of the media before its camera; nothing in air."""
-
-    layers: Layers | None
-    z0: float | None
-    interface_normal: FloatArray | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -190,34 +190,32 @@ def settled_jointly(
 
 
 def _coarse(
-    observations: JointObservations, start: JointUnknowns, focal: FloatArray, rounds: int = COARSE
+    picks: JointObservations, start: JointUnknowns, focal: FloatArray, rounds: int = COARSE
 ) -> tuple[JointUnknowns, FloatArray, FloatArray]:
     """Return a state that most agree on, and misfits over the usual: of rays (n,), control (p,).
 
     Huber's weights, renewed a few times: a match with the wrong window must not bend the whole, nor
     a control point with a wrong coordinate. The misfit of a point that is no control is 0.
     """
-    fixed = np.isfinite(observations.known).any(axis=1)
+    fixed = np.isfinite(picks.known).any(axis=1)
     # Nothing else tells where on its ray the end of a length is: loose, it takes the scale along.
-    fixed &= ~observations.unchecked
-    spread = np.where(fixed[:, None], LOOSE, 1.0) * observations.sigma_known
+    fixed &= ~picks.unchecked
+    spread = np.where(fixed[:, None], LOOSE, 1.0) * picks.sigma_known
     for number in range(rounds):
-        away = _away(_System(observations, start, focal))
+        away = _away(_System(picks, start, focal))
         away = np.nan_to_num(away, nan=1e6)
         if number and fixed.any():  # before, the start is no better than any control point
-            off = _off_control(observations, start)[fixed]
-            spread[fixed] = LOOSE * observations.sigma_known[fixed]
+            off = _off_control(picks, start)[fixed]
+            spread[fixed] = LOOSE * picks.sigma_known[fixed]
             spread[fixed] /= np.sqrt(huber_weights(off, 2.0))[:, None]
         weighted = replace(
-            observations,
-            sigma=observations.sigma / np.sqrt(huber_weights(away, 2.0)),
-            sigma_known=spread,
+            picks, sigma=picks.sigma / np.sqrt(huber_weights(away, 2.0)), sigma_known=spread
         )
         system = _System(weighted, start, focal)
         start = _unknowns(system.network.minimise(system.start, most=6).state)
-    away = _away(_System(observations, start, focal)) / observations.sigma
+    away = _away(_System(picks, start, focal)) / picks.sigma
     usual = max(float(np.median(away)) / 1.1774, 1.0)  # Rayleigh's median
-    off = _off_control(observations, start)
+    off = _off_control(picks, start)
     agreed = max(float(np.median(off[fixed])) / 1.5382, 1.0) if fixed.any() else 1.0  # Maxwell's
     return start, np.nan_to_num(away / usual, nan=np.inf), off / agreed
 
@@ -241,27 +239,23 @@ def _away(system: _System) -> FloatArray:
     return np.linalg.norm(system.rays(system.start)[0], axis=1)
 
 
-def _off_control(observations: JointObservations, state: JointUnknowns) -> FloatArray:
+def _off_control(picks: JointObservations, state: JointUnknowns) -> FloatArray:
     """Return how far points lie from what is known, in its standard deviations, shape (p,)."""
-    return np.linalg.norm(
-        np.nan_to_num((state.xyz - observations.known) / observations.sigma_known), axis=1
-    )
+    return np.linalg.norm(np.nan_to_num((state.xyz - picks.known) / picks.sigma_known), axis=1)
 
 
-def _of_ray(observations: JointObservations, ray: int, test: float) -> Blunder:
+def _of_ray(picks: JointObservations, ray: int, test: float) -> Blunder:
     return Blunder(
-        point=observations.ids[observations.point[ray]],
-        where=observations.names[observations.camera[ray]],
-        test=float(test),
+        point=picks.ids[picks.point[ray]], where=picks.names[picks.camera[ray]], test=float(test)
     )
 
 
-def _of_control(observations: JointObservations, point: int, test: float) -> Blunder:
-    return Blunder(point=observations.ids[point], where="control", test=float(test))
+def _of_control(picks: JointObservations, point: int, test: float) -> Blunder:
+    return Blunder(point=picks.ids[point], where="control", test=float(test))
 
 
 def _without(
-    observations: JointObservations, keep: BoolArray, known: FloatArray, blunders: list[Blunder]
+    picks: JointObservations, keep: BoolArray, known: FloatArray, blunders: list[Blunder]
 ) -> JointObservations:
     """Return what is left without gross errors.
 
@@ -270,11 +264,9 @@ def _without(
     GeometryError
         If too little control is left to hold the frame.
     """
-    reduced = with_enough_rays(with_rays(replace(observations, known=known), keep))
-    if observations.frame_is_known and not reduced.frame_is_known:
-        control = {
-            observations.ids[k] for k in np.flatnonzero(np.isfinite(observations.known).all(axis=1))
-        }
+    reduced = with_enough_rays(with_rays(replace(picks, known=known), keep))
+    if picks.frame_is_known and not reduced.frame_is_known:
+        control = {picks.ids[k] for k in np.flatnonzero(np.isfinite(picks.known).all(axis=1))}
         raise GeometryError(
             "the control points contradict each other or their picks: "
             f"{', '.join(sorted(control & {b.point for b in blunders}))}. "
@@ -290,37 +282,33 @@ class _System:
     nearest one's distance), and each focal length that is not held.
     """
 
-    def __init__(
-        self, observations: JointObservations, start: JointUnknowns, focal: FloatArray
-    ) -> None:
-        self.seen, knowledge = observations, observations.cameras
-        count, stay = len(observations.names), len(PARAMETERS)
+    def __init__(self, picks: JointObservations, start: JointUnknowns, focal: FloatArray) -> None:
+        self.seen, knowledge = picks, picks.cameras
+        count, stay = len(picks.names), len(PARAMETERS)
         free = np.zeros((count, len(CAMERA)), dtype=bool)
         free[:, ESTIMATED] = True
-        free[:, 0] = observations.sigma_focal > 0
+        free[:, 0] = picks.sigma_focal > 0
         owner = np.repeat(np.arange(count)[:, None], len(CAMERA), axis=1)
         if knowledge is not None:
             free = knowledge.free
             owner[:, SHARED] = np.array(knowledge.lens)[:, None]
-        elif not observations.frame_is_known:
+        elif not picks.frame_is_known:
             # Seven are free: the far camera, and for the scale the near one's distance.
             free[0], free[1, CAMERA.index("Z")] = False, False
         self.own_free = free & (owner == np.arange(count)[:, None])
         number = np.where(self.own_free, np.cumsum(self.own_free).reshape(free.shape) - 1, -1)
         self.column = np.where(free, number[owner, np.arange(len(CAMERA))], -1)
-        order = np.argsort(observations.camera, kind="stable")
-        self.own = np.split(order, np.searchsorted(observations.camera[order], np.arange(1, count)))
-        self.fixed = np.argwhere(np.isfinite(observations.known))
+        order = np.argsort(picks.camera, kind="stable")
+        self.own = np.split(order, np.searchsorted(picks.camera[order], np.arange(1, count)))
+        self.fixed = np.argwhere(np.isfinite(picks.known))
         # A point without rays stays where it is, in all three coordinates.
-        self.used = np.bincount(observations.point, minlength=len(observations.ids)) > 0
-        self.loose = np.flatnonzero(self.used & ~np.isfinite(observations.known[:, 2]))
+        self.used = np.bincount(picks.point, minlength=len(picks.ids)) > 0
+        self.loose = np.flatnonzero(self.used & ~np.isfinite(picks.known[:, 2]))
         self.reach = float(min(camera.centre[2] for camera in start.cameras))
         self.reach *= 1.0 if knowledge is None else SHALLOW
         self.focal = np.flatnonzero(free[:, 0]) if knowledge is None else np.zeros(0, np.int64)
         self.first_focal = np.log(focal)
-        labels = [
-            f"{observations.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()
-        ]
+        labels = [f"{picks.names[i]}: {CAMERA[k]}" for i, k in np.argwhere(self.own_free).tolist()]
         # The ends of a taped length meet in one row and are not eliminated.
         taped = knowledge.lengths if knowledge else ()
         self.lengths = tuple(one for one in taped if self.used[[*one[:2]]].all())
@@ -328,7 +316,7 @@ class _System:
         shape = (len(self.used), 3)
         self.kept = np.full(shape, -1)
         self.kept[ends] = len(labels) + np.arange(3 * len(ends)).reshape(-1, 3)
-        labels += [f"{observations.ids[k]}: {axis}" for k in ends for axis in "XYr"]
+        labels += [f"{picks.ids[k]}: {axis}" for k in ends for axis in "XYr"]
         eliminated = self.used & (self.kept[:, 0] < 0)
         radial = start.radial if len(start.radial) else np.zeros((count, 2))
         self.start = NetworkState(
@@ -343,11 +331,7 @@ class _System:
                 for k, unknowns in enumerate(self.column.tolist())
             } for kind, first in (("camera", True), ("radial", False))},
             free=np.broadcast_to(eliminated[:, None], shape), kept=self.kept,
-            names=[
-                f"{observations.ids[k]}: {axis}"
-                for k in np.flatnonzero(eliminated)
-                for axis in "XYr"
-            ],
+            names=[f"{picks.ids[k]}: {axis}" for k in np.flatnonzero(eliminated) for axis in "XYr"],
             terms=(self._rays, self._known, *([self._cameras] if knowledge else [])),
             step=_stepped, rounding=ROUNDING,
             what="the pairs" if knowledge is None else "the photos",
@@ -432,27 +416,27 @@ def _units(
 
 
 def _gross(
-    observations: JointObservations, system: _System, fit: Fit[NetworkState], sigma0: float
+    picks: JointObservations, system: _System, fit: Fit[NetworkState], sigma0: float
 ) -> tuple[BoolArray, FloatArray, list[Blunder]]:
     """Return which rays stay, the coordinates that stay known, and what goes: the worst of each.
 
     A ray is judged by the larger of its two coordinates, by the rays of its own precision, and by
     how many there are: of 350 000 honest ones 160 would pass a limit of 3.5.
     """
-    count = 2 * len(observations.camera)
+    count = 2 * len(picks.camera)
     tests = standardised(fit.residuals, fit.linear.redundancy_numbers)
     tests = np.abs(np.nan_to_num(tests))
-    points = np.concatenate([np.repeat(observations.point, 2), system.fixed[:, 0]])
-    tests[: len(points)][observations.unchecked[points]] = 0.0
+    points = np.concatenate([np.repeat(picks.point, 2), system.fixed[:, 0]])
+    tests[: len(points)][picks.unchecked[points]] = 0.0
     units = _units(fit.residuals[:count], fit.linear.redundancy_numbers[:count],
-                   np.repeat(observations.sigma, 2), sigma0)  # fmt: skip
+                   np.repeat(picks.sigma, 2), sigma0)  # fmt: skip
     rays = (tests[:count] / units).reshape(-1, 2).max(axis=1, initial=0.0)
     # That rays are more precise than they were believed to be says nothing of control.
     coordinates = tests[count:][: len(system.fixed)] / max(sigma0, 1.0)
-    worst = np.zeros(len(observations.ids))
-    np.maximum.at(worst, observations.point, rays)
+    worst = np.zeros(len(picks.ids))
+    np.maximum.at(worst, picks.point, rays)
     np.maximum.at(worst, system.fixed[:, 0], coordinates)
-    bad = (rays >= worst[observations.point]) & (rays > outlier_limit(count))
+    bad = (rays >= worst[picks.point]) & (rays > outlier_limit(count))
     wrong = coordinates >= worst[system.fixed[:, 0]]
     wrong &= coordinates > outlier_limit(len(coordinates))
     # A wrong control point bends its neighbours: only the worst of them goes at a time.
@@ -460,18 +444,18 @@ def _gross(
     # It bends rays of other points too, which are judged again without it.
     if coordinates[wrong].max(initial=0.0) > rays.max(initial=0.0):
         bad[:] = False
-    blunders = [_of_ray(observations, k, rays[k]) for k in np.flatnonzero(bad).tolist()]
-    control = observations.known.copy()
+    blunders = [_of_ray(picks, k, rays[k]) for k in np.flatnonzero(bad).tolist()]
+    control = picks.known.copy()
     for k in np.flatnonzero(wrong).tolist():
         point = int(system.fixed[k, 0])
         control[point] = np.nan
-        blunders.append(_of_control(observations, point, coordinates[k]))
+        blunders.append(_of_control(picks, point, coordinates[k]))
     return ~bad, control, blunders
 
 
 def _adjusted(
     given: JointObservations,
-    observations: JointObservations,
+    picks: JointObservations,
     system: _System,
     fit: Fit[NetworkState],
     sigma0: float,
@@ -492,7 +476,7 @@ def _adjusted(
 
     place, every = system.column[:, ESTIMATED], system.column.ravel()
     by_camera = factor * np.array([part(columns, columns) for columns in place])
-    between = factor * np.array([part(place[far], place[near]) for far, near in observations.pairs])
+    between = factor * np.array([part(place[far], place[near]) for far, near in picks.pairs])
     covariance = factor * linear.block_cofactor
     for k in np.flatnonzero(system.kept[:, 0] >= 0):
         covariance[k] = factor * part(system.kept[k], system.kept[k])
@@ -500,9 +484,10 @@ def _adjusted(
     last = _unknowns(fit.state)
     xyz = np.where(system.used[:, None], last.xyz, np.nan)
     return JointAdjustment(
-        cameras=last.cameras, radial=last.radial, xyz=xyz, observations=observations,
-        covariance=covariance, sigma0=sigma0, redundancy=fit.redundancy - len(system.loose), iterations=fit.iterations,
+        cameras=last.cameras, radial=last.radial, xyz=xyz, observations=picks,
+        covariance=covariance, sigma0=sigma0, redundancy=fit.redundancy - len(system.loose),
+        iterations=fit.iterations,
         residuals=system.rays(fit.state)[0], control=xyz - given.known,
         blunders=blunders[0], left_in=blunders[1], by_camera=by_camera, between=between,
-        of_cameras=factor * part(every, every) if observations.cameras else np.zeros((0, 0)),
+        of_cameras=factor * part(every, every) if picks.cameras else np.zeros((0, 0)),
     )  # fmt: skip

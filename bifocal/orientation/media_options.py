@@ -34,7 +34,8 @@ def media_of(options: Mapping[str, Any]) -> PairMedia:
     )
     return PairMedia.stated(
         options["indices"], options.get("thicknesses") or (), ports=ports,
-        depth=options.get("depth"), normals=(_normal(normals[0]), _normal(normals[1])), estimate=options.get("estimate") or (),
+        depth=options.get("depth"), normals=(_normal(normals[0]), _normal(normals[1])),
+        estimate=options.get("estimate") or (),
         priors=dict(_prior(text) for text in options.get("prior") or ()),
     )  # fmt: skip
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.photo import MediaOfPhoto, Photo
+from bifocal.media import MediaOfPhoto
+from bifocal.model.photo import Photo
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.errors import InputError

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from bifocal.matching.matches import Matches
+from bifocal.media import MediaOfPhoto
 from bifocal.model.lens import Lens
 from bifocal.model.pair import Pair
-from bifocal.model.photo import MediaOfPhoto, Photo
+from bifocal.model.photo import Photo
 from bifocal.model.photo_entries import SET_FORMAT
 from bifocal.model.photo_set import PhotoSet
 from bifocal.remarks import remark

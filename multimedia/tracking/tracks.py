@@ -191,5 +191,6 @@ def track_particles(
     return Tracks(
         track=track, frame=frame, number=number[order], xyz=xyz, covariance=covariance,
         velocity=velocity, velocity_covariance=velocity_covariance, outlier=outlier,
-        step=rules.step, change=rules.change, drift=np.array(rules.drift), particles=len(previous), by_chance=chance,
+        step=rules.step, change=rules.change, drift=np.array(rules.drift),
+        particles=len(previous), by_chance=chance,
     )  # fmt: skip
