@@ -52,7 +52,7 @@ def office() -> str | None:
     return next((found for name in OFFICE if (found := shutil.which(name))), None)
 
 
-def diagnosis() -> dict[str, Any]:
+def diagnosis() -> dict[str, object]:
     """Return what a report of a fault needs: versions, extras, LibreOffice, memory, disk.
 
     Memory and disk in bytes; None for what is absent.

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import Any
 
 from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob, photo_roles, steps_of
-from bifocal.campaigns.step_store import read_whole_record, record_key, remove_made
+from bifocal.campaigns.step_store import WholeRecord, read_whole_record, record_key, remove_made
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.provenance import FileHashes
@@ -55,7 +54,7 @@ def remove_leftovers(job: PairJob, made: Collection[str]) -> tuple[str, ...]:
     """
     in_vain = set(job.products) - {step.name for step in steps_of(job)}
     records = _records(job)
-    inputs: dict[str, Any] = {}
+    inputs: dict[str, list[str]] = {}
     for name in records.keys() & set(made):
         inputs |= records[name]["inputs"]
     standing: dict[str, Mapping[str, str]] = {}
@@ -77,7 +76,7 @@ def remove_leftovers(job: PairJob, made: Collection[str]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _records(job: PairJob) -> dict[str, dict[str, Any]]:
+def _records(job: PairJob) -> dict[str, WholeRecord]:
     """Return the records of the steps in a pair's folder, in the order of work."""
     records = {}
     for name in (FIRST_STEP, *PRODUCTS):
@@ -87,7 +86,7 @@ def _records(job: PairJob) -> dict[str, dict[str, Any]]:
     return records
 
 
-def _follows(record: Mapping[str, Any], standing: Mapping[str, Mapping[str, str]]) -> bool:
+def _follows(record: WholeRecord, standing: Mapping[str, Mapping[str, str]]) -> bool:
     with suppress(KeyError):  # a step before it is not there
         key = record_key(record, {name: standing[name] for name in record["after"]})
         return bool(key == record["key"])

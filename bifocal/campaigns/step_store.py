@@ -22,7 +22,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, cast
 
 from bifocal.options import defaults_of, typed
 from bifocal.remarks import remark
@@ -105,6 +105,24 @@ class StepRecord:
     command: str = ""
 
 
+class WholeRecord(TypedDict, total=False):
+    """What the record in a step's folder holds; nothing where none can be read."""
+
+    format: str
+    program: str
+    date: str
+    step: str
+    key: str
+    inputs: dict[str, list[str]]
+    after: list[str]
+    options: dict[str, object]
+    outputs: dict[str, str]
+    remarks: list[str]
+    seconds: float
+    machine: str
+    command: str
+
+
 def step_key(step: Step, earlier: Mapping[str, StepRecord], hashes: FileHashes) -> str:
     """Return the hash of everything that decides a step's result."""
     for path in step.files.values():
@@ -141,13 +159,13 @@ def read_record(folder: Path) -> StepRecord | None:
     return None
 
 
-def read_whole_record(folder: Path) -> dict[str, Any]:
+def read_whole_record(folder: Path) -> WholeRecord:
     """Return all that the record of a step's folder tells; empty where none can be read."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         if data["format"] == FORMAT:
             learn(data)
-            return dict(data)
+            return cast("WholeRecord", data)
     return {}
 
 

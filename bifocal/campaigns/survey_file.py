@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, TypeGuard
 
 from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
@@ -33,15 +33,15 @@ OF_MOSAIC = ("gsd", "bounds", "priority", "gain", "blend", "overviews")
 WHOLE = ("joint", "mosaic")
 
 
-def mosaic_wanted(path: Path) -> dict[str, Any] | None:
+def mosaic_wanted(path: Path) -> dict[str, object] | None:
     """Return the options of the mosaic that a checked survey file asks for; None: it wants none."""
     mosaic = _parsed(path).get("mosaic")
     return _options_of_mosaic(mosaic, []) if isinstance(mosaic, dict) else {} if mosaic else None
 
 
-def _options_of_mosaic(table: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+def _options_of_mosaic(table: Mapping[str, object], faults: list[str]) -> dict[str, object]:
     """Return what is said of the mosaic, noting what is wrong."""
-    options, values = options_of(MosaicCommand), {}
+    options, values = options_of(MosaicCommand), dict[str, object]()
     for key, value in table.items():
         try:
             if key not in OF_MOSAIC:
@@ -142,7 +142,7 @@ def in_survey_words(text: str) -> str:
     return _OPTION.sub(key_of, text)
 
 
-def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[str]:
+def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, object]) -> list[str]:
     """Return what stands against making something of all pairs together."""
     if not any(whole.values()):
         return []
@@ -162,7 +162,7 @@ def _faults_of_whole(jobs: Sequence[PairJob], whole: Mapping[str, Any]) -> list[
     return faults
 
 
-def _parsed(path: Path) -> dict[str, Any]:
+def _parsed(path: Path) -> dict[str, object]:
     data = read_toml(path, "survey file")
     if data.get("format", FORMAT) != FORMAT:
         raise InputError(
@@ -171,16 +171,22 @@ def _parsed(path: Path) -> dict[str, Any]:
     return data
 
 
-def _is_name(value: Any) -> bool:
+def _is_name(value: object) -> TypeGuard[str]:
     """Whether a value may be the name of a file."""
     return isinstance(value, str) and bool(value) and value.isprintable()
 
 
-def _entries(
-    data: Mapping[str, Any], base: Path, where: str, faults: list[str]
-) -> dict[str, dict[str, Any]]:
+class _Entries(TypedDict):
+    """What a table says of a pair, or of all."""
+
+    files: dict[str, Path]
+    options: dict[str, object]
+    products: tuple[str, ...]
+
+
+def _entries(data: Mapping[str, object], base: Path, where: str, faults: list[str]) -> _Entries:
     """Return files, options and products of a table, noting what is wrong."""
-    entries: dict[str, dict[str, Any]] = {"files": {}, "options": {}, "products": {}}
+    entries = _Entries(files={}, options={}, products=())
     for key, value in data.items():
         if key in FILES:
             if _is_name(value):
@@ -191,7 +197,7 @@ def _entries(
             if not isinstance(value, list) or set(map(str, value)) - set(PRODUCTS):
                 faults.append(f"{where}: products: expected some of {', '.join(PRODUCTS)}.")
             else:
-                entries["products"][key] = tuple(name for name in PRODUCTS if name in value)
+                entries["products"] = tuple(name for name in PRODUCTS if name in value)
         elif key in OF_PAIR:
             try:
                 entries["options"][key] = OF_PAIR[key].read(value)
@@ -205,9 +211,9 @@ def _entries(
 
 
 def _job(
-    entry: Mapping[str, Any],
+    entry: Mapping[str, object],
     number: int,
-    common: Mapping[str, dict[str, Any]],
+    common: _Entries,
     folders: tuple[Path, Path],
     where: str,
     faults: list[str],
@@ -229,10 +235,10 @@ def _job(
     if not name.strip() or not name.isprintable():
         faults.append(f"{where}: name = {name!r}: expected a name that can be read.")
     far, near, *more = files
-    products = entries["products"].get("products") or common["products"].get("products")
-    return PairJob(
+    job = PairJob(
         name=name, folder=out / file_name(name), far=far, near=near, more=tuple(more),
         files={**common["files"], **entries["files"]},
         options={**common["options"], **entries["options"]},
-        **({"products": products} if products else {}),
     )  # fmt: skip
+    products = entries["products"] or common["products"]
+    return replace(job, products=products) if products else job

@@ -12,10 +12,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import cast
 
 from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob
-from bifocal.campaigns.step_store import FORMAT, RECORD, read_record, record_key
+from bifocal.campaigns.step_store import FORMAT, RECORD, WholeRecord, read_record, record_key
 from bifocal.campaigns.workflow import facade
 from bifocal.files.hash_list import SUMS
 from bifocal.files.point_tables import read_survey_points
@@ -99,7 +99,7 @@ class Verification:
         sentences += [point.sentence() for point in self.worked]
         return [*sentences, f"Digest of the delivery: {self.digest}"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain data."""
         return {"same": self.same, **asdict(self)}
 
@@ -214,7 +214,7 @@ def _no_files(folder: Path, hashes: Mapping[str, str]) -> Iterator[FileState]:
             yield FileState(file=name, state="not listed", why="a link or pipe, not a file")
 
 
-def _records(folder: Path) -> dict[str, dict[str, Any]]:
+def _records(folder: Path) -> dict[str, WholeRecord]:
     """Return the records of steps by their place; an empty one where it cannot be read."""
     places = (path.relative_to(folder) for path in sorted(folder.rglob(RECORD)))
     return {
@@ -224,19 +224,19 @@ def _records(folder: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _record(path: Path) -> WholeRecord:
     with suppress(InputError, KeyError, TypeError, ValueError, AttributeError):
         data = read_object(path, what="record")
         texts = [data["program"], data["date"], data["step"], data["key"], *data["after"]]
-        texts += [*data["outputs"].values(), *chain(*_inputs(data).values())]
+        texts += [*data["outputs"].values(), *chain(*_inputs(cast("WholeRecord", data)).values())]
         whole = all(isinstance(text, str) for text in texts) and isinstance(data["options"], dict)
         if whole and data["format"] == FORMAT:
-            return data
+            return cast("WholeRecord", data)
     return {}
 
 
 def _listed(
-    folder: Path, records: Mapping[str, dict[str, Any]], hashes: Mapping[str, str]
+    folder: Path, records: Mapping[str, WholeRecord], hashes: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
     """Yield the files that should be there with their hashes; a list has none of its own."""
     # What went in may lie beside what came out; photos of two folders may have one name.
@@ -256,7 +256,7 @@ def _listed(
             yield _inside(name, file), digest
 
 
-def _inputs(record: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+def _inputs(record: WholeRecord) -> dict[str, tuple[str, str]]:
     return {role: (name, digest) for role, (name, digest) in record.get("inputs", {}).items()}
 
 
@@ -281,7 +281,7 @@ def _judged(hashes: Mapping[str, str], listed: Mapping[str, str]) -> Iterator[Fi
             yield FileState(file=name, state="unchanged" if same else "changed")
 
 
-def _broken(records: Mapping[str, dict[str, Any]]) -> Iterator[FileState]:
+def _broken(records: Mapping[str, WholeRecord]) -> Iterator[FileState]:
     """Yield each record: does what it tells follow from the records before it?"""
     for name, data in records.items():
         if not data:
@@ -333,7 +333,7 @@ def _worked(
 
 
 def _remade(
-    folder: Path, records: Mapping[str, dict[str, Any]], sources: Path | None, progress: Progress
+    folder: Path, records: Mapping[str, WholeRecord], sources: Path | None, progress: Progress
 ) -> Iterator[FileState]:
     """Yield every product of every pair, made anew."""
     for parent in dict.fromkeys(PurePosixPath(name).parent.parent for name in records):
@@ -363,7 +363,7 @@ def _remade(
 
 
 def _job(
-    root: Path, folder: Path, steps: Mapping[str, dict[str, Any]], sources: Path | None, place: Path
+    root: Path, folder: Path, steps: Mapping[str, WholeRecord], sources: Path | None, place: Path
 ) -> PairJob:
     """Return the work that the records of a pair tell of, with copies of all that went in."""
     pair = next((name for name in steps[FIRST_STEP]["outputs"] if name.endswith(_PAIR)), "")

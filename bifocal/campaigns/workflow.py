@@ -98,7 +98,7 @@ class SurveyResult:
 
         return replace(self, outcomes=put(self.outcomes), together=put(self.together))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain data."""
         pairs = [outcome.to_dict() for outcome in self.outcomes]
         whole = {outcome.name: outcome.to_dict() for outcome in self.together}
@@ -167,7 +167,7 @@ def begin_survey(
 
 
 def plan_survey(
-    jobs: Sequence[PairJob], *, mosaic: Mapping[str, Any] | None = None
+    jobs: Sequence[PairJob], *, mosaic: Mapping[str, object] | None = None
 ) -> list[tuple[str, str, str]]:
     """Return (pair, step, ``keep``, ``make`` or what stands against it), doing nothing.
 
@@ -210,7 +210,7 @@ def _plan_of_frame(jobs: Sequence[PairJob]) -> str:
 
 
 def _plan_of_mosaic(
-    jobs: Sequence[PairJob], options: Mapping[str, Any], rows: Sequence[tuple[str, str, str]]
+    jobs: Sequence[PairJob], options: Mapping[str, object], rows: Sequence[tuple[str, str, str]]
 ) -> str:
     if any(what != "keep" for _, _, what in rows):
         return "make"
@@ -224,7 +224,7 @@ def run_survey(
     jobs: Sequence[PairJob],
     *,
     machines: Machines = Machines(),
-    mosaic: Mapping[str, Any] | None = None,
+    mosaic: Mapping[str, object] | None = None,
     progress: Progress = no_progress,
     tell: Callable[[str], None] | None = None,
 ) -> SurveyResult:
@@ -317,7 +317,7 @@ def _one_frame(
 
 def _mosaic(
     jobs: Sequence[PairJob],
-    options: Mapping[str, Any],
+    options: Mapping[str, object],
     first: PairJob,
     progress: Progress,
     tell: Callable[[str], None] | None,

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from bifocal.collimation.proposals import Proposal
 from bifocal.collimation.records import Change, PickedControl, PickedPoint, SurveyState
 from bifocal.collimation.shapes import places_of
 from bifocal.collimation.survey_on_page import SurveyOnPage
@@ -25,7 +26,7 @@ ASIDE = "aside"
 _ORIENTED = ("relief", "ortho", "deliver", "set", "pair")
 
 
-def fields_of_exchange(session: SurveyOnPage) -> dict[str, Any]:
+def fields_of_exchange(session: SurveyOnPage) -> dict[str, object]:
     """Return what the command is told besides: the orientation's files, shapes re-projected.
 
     Raises
@@ -39,7 +40,7 @@ def fields_of_exchange(session: SurveyOnPage) -> dict[str, Any]:
     if file is not None and not products.is_own(file):
         raise InputError(remark("page.begun_with_pair", name=file.name))
     files = {name: kind for name, kind in products.made.items() if kind in _ORIENTED}
-    fields: dict[str, Any] = {
+    fields: dict[str, object] = {
         "step": True, "made": files,
         "causes": {kind: dict(products.causes.get(kind, {})) for kind in {*files.values()}},
     }  # fmt: skip
@@ -108,14 +109,14 @@ def turned_picks(record: Any) -> Any:
 
 
 def proposal_noted(
-    session: SurveyOnPage, command: Mapping[str, Any], changes: list[Change]
-) -> dict[str, Any]:
+    session: SurveyOnPage, command: Mapping[str, object], changes: list[Change]
+) -> dict[str, object]:
     """Return the undo of an exchange with what is proposed after it; other commands as they are."""
     undone = command["op"] == "undo" and any(map(_is_swap, changes))
     return {**command, **(_proposal_now(session) if undone else {})}
 
 
-def proposal_kept(command: Mapping[str, Any], changes: list[Change]) -> list[Change]:
+def proposal_kept(command: Mapping[str, object], changes: list[Change]) -> list[Change]:
     """Return the changes of an undo, after which redo brings back what was proposed before it."""
     if "proposal" not in command:
         return changes
@@ -159,10 +160,11 @@ def put_aside(session: SurveyOnPage) -> None:
     session.pictures.show_photos([info.path for info in session.pictures.infos][::-1])
 
 
-def _unchanged(folder: Path, proposal: Mapping[str, Any] | None) -> dict[str, Any] | None:
+def _unchanged(folder: Path, proposal: Mapping[str, object] | None) -> Proposal | None:
     """Return an orientation that was proposed, if its file is still the same."""
     path = folder / proposal["pair"] if proposal else None
     if proposal is None or path is None or not path.is_file():
         return None
     same = known_hash(path) == proposal["sha256"] and Pair.read(path) is not None
-    return {key: value for key, value in proposal.items() if key != "sha256"} if same else None
+    kept = {key: value for key, value in proposal.items() if key != "sha256"}
+    return cast("Proposal", kept) if same else None

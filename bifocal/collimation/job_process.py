@@ -78,7 +78,7 @@ def main() -> int:
             share = min(max(done / total, 0.0), 1.0) if total > 0 else 0.0
             tell({"progress": share, "message": what})
 
-    def tell(line: dict[str, Any]) -> None:
+    def tell(line: dict[str, object]) -> None:
         out.write(json.dumps(with_keys(plain(line))) + "\n")
         out.flush()
 

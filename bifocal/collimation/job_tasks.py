@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from bifocal.collimation.fields import FieldError, positive_of, tupled
 from bifocal.collimation.jobs import PageJob
 from bifocal.collimation.live_orientation import control_of, lenses_of, site_of
 from bifocal.collimation.product_graph import causes_of, out_of_date
-from bifocal.collimation.proposals import NOMINAL, discard_pair
+from bifocal.collimation.proposals import NOMINAL, Report, discard_pair
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
@@ -43,7 +43,7 @@ def start_job(session: Session, kind: str, options: Options, *, quiet: bool = Fa
         If another one runs, the survey is not far enough for it, or an option is impossible.
     """
 
-    def task() -> dict[str, Any]:
+    def task() -> dict[str, object]:
         job_task = task_of(session, kind, options) | {"quiet": quiet}
         job_task["causes"] = causes_of(session, kind)
         if kind == "align":  # what was proposed before stays: an exchange may bring it back
@@ -113,7 +113,7 @@ def _ortho_task(session: Session) -> dict[str, Any]:
     return {"out": str(out), "overwrite": session.products.is_own(out)}
 
 
-def _said(options: Options, *keys: str) -> dict[str, Any]:
+def _said(options: Options, *keys: str) -> dict[str, object]:
     """Return options of a command that are typed on the page, by the command's names."""
     settings = {}
     for key in keys:
@@ -127,7 +127,7 @@ def _said(options: Options, *keys: str) -> dict[str, Any]:
     return settings
 
 
-def _ortho_options(session: Session, options: Options) -> dict[str, Any]:
+def _ortho_options(session: Session, options: Options) -> dict[str, object]:
     relief = session.products.current("relief")
     keys = ["gsd", "bounds", "scale"]
     if session.photo_set is None:  # of a set each place is taken from the photo that sees it best
@@ -238,7 +238,7 @@ def _join_task(session: Session) -> dict[str, Any]:
     }
 
 
-def _rectify_task(session: Session, options: Options) -> dict[str, Any]:
+def _rectify_task(session: Session, options: Options) -> dict[str, object]:
     """Return what is told of one photo alone that is brought to scale by a rectangle."""
     infos = session.pictures.infos
     if len(infos) != 1:
@@ -348,7 +348,7 @@ def finish(session: Session, task: Mapping[str, Any], result: Mapping[str, Any])
             discard_pair(Path(task["out"]))
             return ""  # the user took it in hand meanwhile
         causes = _same(task, "control", *(() if task["free_scale"] else ("site",)))
-        session.propose(Path(task["out"]), {**result, "causes": causes})
+        session.propose(Path(task["out"]), cast("Report", {**result, "causes": causes}))
         return message
     if kind == "join":
         path = Path(task["out"])

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from bifocal.collimation.proposals import Report
 from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.survey_on_page import SurveyOnPage
 from bifocal.faces.faces_files import beside
@@ -53,16 +54,21 @@ def proposal_is_current(session: SurveyOnPage) -> bool:
 
     What gives the scale of one that has none is taken up as it is typed.
     """
-    return causes_hold(session, (session.proposal or {}).get("report", {}))
+    return causes_hold(session, report_of(session))
 
 
-def causes_hold(session: SurveyOnPage, report: Mapping[str, Any]) -> bool:
+def report_of(session: SurveyOnPage) -> Report:
+    """Return what was reported of the orientation that waits to be accepted; nothing of none."""
+    return Report() if session.proposal is None else session.proposal["report"]
+
+
+def causes_hold(session: SurveyOnPage, report: Report) -> bool:
     """Whether the causes that a report names are as they were."""
     causes = report.get("causes", {})
     return all(_digest(session, cause) == digest for cause, digest in causes.items())
 
 
-def causes_again(session: SurveyOnPage, report: Mapping[str, Any]) -> dict[str, str]:
+def causes_again(session: SurveyOnPage, report: Report) -> dict[str, str]:
     """Return the causes that a report names, as they are now."""
     return {cause: _digest(session, cause) for cause in report.get("causes", {})}
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import cv2
 import numpy as np
@@ -41,7 +41,42 @@ def measure_of(state: SurveyState) -> list[Any] | None:
     return None
 
 
-def rescale(path: Path, report: Mapping[str, Any], measure: list[Any] | None) -> dict[str, Any]:
+class ControlResidual(TypedDict, total=False):
+    """How a control point fits: its residuals in both photos, and what was made of them."""
+
+    id: str
+    residual_px: list[float | None]
+    test: float | None
+    used: bool
+
+
+class Report(TypedDict, total=False):
+    """What the page shows of an orientation: of `align`, or of cameras at hand without a scale."""
+
+    way: str
+    distance1: float
+    distance2: float
+    standard_deviations: dict[str, float]
+    focal_px: list[float]
+    planes: list[dict[str, object]]
+    control: list[ControlResidual]
+    words: Sequence[str]
+    remarks: Sequence[str]
+    wall: list[list[list[float]]]
+    causes: dict[str, str]
+    free_scale: bool
+    scale: list[Any] | None
+
+
+class Proposal(TypedDict):
+    """An orientation that waits to be accepted: the record that the journal keeps of it."""
+
+    op: str
+    pair: str
+    report: Report
+
+
+def rescale(path: Path, report: Report, measure: list[Any] | None) -> Report:
     """Bring a proposed pair file to the scale of a measure and return the report of it."""
     if measure is None:
         return {**report, "scale": None}

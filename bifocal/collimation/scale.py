@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import cast
 
-from bifocal.collimation.proposals import copy_pair, measure_of, rescale
+from bifocal.collimation.proposals import Report, copy_pair, measure_of, rescale
 from bifocal.collimation.survey_on_page import SurveyOnPage
 from photocore.output import free_path
 
 
-def free_report(session: SurveyOnPage) -> dict[str, Any] | None:
+def free_report(session: SurveyOnPage) -> Report | None:
     """Return what was reported of the orientation, if the photos alone gave it."""
     record = session.proposal or session.state.orientation.get("pair") or {}
-    report = cast("dict[str, Any]", record.get("report", {}))
+    report = cast("Report", record.get("report", {}))
     return report if report.get("free_scale") else None
 
 

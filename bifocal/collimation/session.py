@@ -29,7 +29,7 @@ from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.product_graph import causes_again, causes_hold
 from bifocal.collimation.products import Products
 from bifocal.collimation.project import JoinedSet, SurveyFiles
-from bifocal.collimation.proposals import accept_pair, discard_pair
+from bifocal.collimation.proposals import Proposal, Report, accept_pair, discard_pair
 from bifocal.collimation.records import Change, SurveyState
 from bifocal.collimation.scale import follow_scale, is_unscaled
 from bifocal.collimation.shapes import outlines_of
@@ -78,16 +78,16 @@ class Session:
         #: Tells this run of the server from the one before it, whose revisions mean nothing now.
         self.serving = uuid.uuid4().hex
         self.revision = 0
-        self.answered: dict[str, Any] = {}
+        self.answered: dict[str, object] = {}
         self.results: LiveResults | None = None
         self.orientation: tuple[object, LiveOrientation] | None = None
-        self.proposal: dict[str, Any] | None = None
+        self.proposal: Proposal | None = None
         self.pick_doubt = ""
         self.good: tuple[LiveResults, WallPrecision | None] | None = None
         self._joined = JoinedSet()
         self._faces = DrawnFaces(lambda: self.state, lambda one: self._carry_out(one, write=True))
         #: Faces that the program would draw.
-        self.suggested: list[dict[str, Any]] = []
+        self.suggested: list[dict[str, object]] = []
         #: From each corner of the rectangle of one photo alone to where it fits. [px]
         self.misfits: list[list[float]] = []
         self.state = SurveyState()
@@ -171,7 +171,7 @@ class Session:
         if self.state.points or self.state.control:
             raise InputError(remark("page.begun_before"))
 
-    def propose(self, path: Path, report: Mapping[str, Any]) -> None:
+    def propose(self, path: Path, report: Report) -> None:
         """Show the orientation that a job found; `align.accept` makes it the survey's own."""
         with self.lock:
             first = Pair.read(path).photo_file(1)
@@ -184,11 +184,11 @@ class Session:
             follow_scale(self)
             self.changed()
 
-    def note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+    def note_proposed(self, path: Path, report: Report) -> None:
         """Let a pair file be the orientation that waits to be accepted."""
         if (before := self.proposed_path) not in (None, path):
             discard_pair(before)
-        self.proposal = {"op": "proposed", "pair": path.name, "report": dict(report)}
+        self.proposal = Proposal(op="proposed", pair=path.name, report=report)
         self._write(self.proposal)
         self._show_proposal()
 
@@ -267,14 +267,14 @@ class Session:
 
     def _note_accepted(self, name: str) -> None:
         """Let the last proposal be the survey's orientation, as a step that can be taken back."""
-        after = {"report": {}, **(self.proposal or {}), "pair": name}
+        after: Any = {"report": {}, **(self.proposal or {}), "pair": name}
         self.state.forget_orientation()
         self._apply([Change("orientation", "pair", None, after)])
         self.proposal = None
 
     def _follow_orientation(self, change: Change, *, live: bool) -> None:
         """Propose an orientation whose acceptance was taken back, or accept it again."""
-        gone, came = cast("dict[str, Any] | None", change.before), cast("Any", change.after)
+        gone, came = cast("Proposal | None", change.before), cast("Any", change.after)
         self.proposal = gone
         if live:
             path = self.files.folder / (gone or came)["pair"]
@@ -282,7 +282,7 @@ class Session:
             self._remember_files()
             self._show_pair(Pair.read(path))
 
-    def take_files(self, pair: Path | None, proposal: dict[str, Any] | None) -> None:
+    def take_files(self, pair: Path | None, proposal: Proposal | None) -> None:
         """Let this be the pair file of the photos shown, or what is proposed instead."""
         if proposal is not None or self.proposal is not None:
             self._write({"op": "unaligned"} if proposal is None else proposal)
@@ -324,7 +324,7 @@ class Session:
 
     # ---- commands
 
-    def command(self, command: Mapping[str, Any]) -> Any:
+    def command(self, command: Mapping[str, object]) -> Any:
         """Carry out a command of the page and return its result.
 
         A command whose ``id`` was answered already is not done twice.
@@ -346,7 +346,7 @@ class Session:
             self.changed()
             return result
 
-    def _checked(self, command: dict[str, Any]) -> Any:
+    def _checked(self, command: dict[str, object]) -> Any:
         """Carry out a command where the survey's files allow it."""
         op = command["op"]
         if op == "align.accept":
@@ -360,7 +360,7 @@ class Session:
         if len(self.answered) > MOST_ANSWERS:
             del self.answered[next(iter(self.answered))]
 
-    def _carry_out(self, command: dict[str, Any], *, write: bool) -> Any:
+    def _carry_out(self, command: dict[str, object], *, write: bool) -> Any:
         """Change the state by a command, after it stands in the journal."""
         op = command["op"]
         if op in ("undo", "redo"):
@@ -388,7 +388,7 @@ class Session:
             self.state.done.append(changes)
             self.state.undone.clear()
 
-    def _undo(self, command: dict[str, Any], *, back: bool, write: bool) -> Any:
+    def _undo(self, command: dict[str, object], *, back: bool, write: bool) -> Any:
         """Take the last changes back, or make them again."""
         source, target = self.state.done, self.state.undone
         if not back:
@@ -425,7 +425,7 @@ class Session:
                 if self.pictures.pair is not None:
                     self.sync.outlines = plain(outlines_of(self.state, self.pictures.pair))
 
-    def _replay(self, record: Mapping[str, Any]) -> None:
+    def _replay(self, record: Mapping[str, object]) -> None:
         """Carry out a record of the journal."""
         op = record["op"]
         fields = fields_of(record)
@@ -441,7 +441,7 @@ class Session:
         elif op == "accepted" and "pair" in fields:
             self._note_accepted(fields["pair"])
         elif op in ("proposed", "accepted", "unaligned"):
-            self.proposal = fields if op == "proposed" else None
+            self.proposal = cast("Proposal", fields) if op == "proposed" else None
         elif op not in NOTES:
             self._carry_out(fields, write=False)
             if "id" in fields:
@@ -474,7 +474,7 @@ class Session:
         if results is not None and (results.sigma_px, results.limits) != (sigma_px, limits):
             self.results = replace(results, sigma_px=sigma_px, limits=limits)
 
-    def _write(self, record: Mapping[str, Any]) -> None:
+    def _write(self, record: Mapping[str, object]) -> None:
         stamp = datetime.now(UTC).isoformat(timespec="milliseconds")
         self.journal.append({**record, "time": stamp})
 

@@ -70,7 +70,7 @@ def relief_within(pair: Pair, relief: ReliefMap, pixels: FloatArray) -> float | 
     return float(np.median(finite)) if len(finite) else None
 
 
-def outlines_of(state: SurveyState, pair: Pair) -> dict[str, dict[str, Any]]:
+def outlines_of(state: SurveyState, pair: Pair) -> dict[str, dict[str, object]]:
     """Return layer and measures of what was drawn to be measured, by its name. [m, m2]"""
     return {
         shape.name: {"layer": shape.layer or OUTLINES, **measures_of(shape, pair)}
@@ -109,9 +109,9 @@ def keep_faces(state: SurveyState, pair: Pair, file: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def shapes_from(faces: Faces, pair: Pair) -> list[dict[str, Any]]:
+def shapes_from(faces: Faces, pair: Pair) -> list[dict[str, object]]:
     """Return faces of a file or a suggestion as the page draws them: name, kind, corners, mends."""
-    shapes: list[dict[str, Any]] = []
+    shapes: list[dict[str, object]] = []
     for face in faces.faces:
         plane = np.zeros(3) if face.plane is None else face.plane
         ring = face.rings[0]
@@ -145,11 +145,11 @@ def commands_for(faces: Faces, state: SurveyState, pair: Pair) -> list[dict[str,
     ]
 
 
-def _drawn(pair: Pair, places: FloatArray) -> dict[str, Any]:
+def _drawn(pair: Pair, places: FloatArray) -> dict[str, object]:
     return {"corners": corners_of(pair, places).round(3).tolist()}
 
 
-def measures_of(shape: DrawnShape, pair: Pair) -> dict[str, Any]:
+def measures_of(shape: DrawnShape, pair: Pair) -> dict[str, object]:
     """Return X, Y, r of a shape's corners, and width, height, area and length as seen square on."""
     places = places_of(pair, shape.corners)
     x, y = places[:, 0], places[:, 1]

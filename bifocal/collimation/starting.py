@@ -8,7 +8,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 
@@ -58,7 +57,7 @@ def open_sample(session: Session) -> None:
         session.changed()
 
 
-def walls_at_hand(session: Session) -> list[dict[str, Any]]:
+def walls_at_hand(session: Session) -> list[dict[str, object]]:
     """Return the walls of another program's project in the survey's folder: words and picture.
 
     None where it holds no project, or one without walls.
@@ -156,7 +155,7 @@ def reopen(number: int, home: Path | None = None) -> str:
         text=True, start_new_session=True,
     )  # fmt: skip
     assert page.stdout is not None
-    answer: dict[str, Any] = json.loads(page.stdout.readline() or "{}")
+    answer: dict[str, object] = json.loads(page.stdout.readline() or "{}")
     if "url" not in answer:
         raise InputError(remark("page.no_recent"))
     return str(answer["url"])

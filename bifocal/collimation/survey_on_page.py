@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.products import Products
 from bifocal.collimation.project import SurveyFiles
+from bifocal.collimation.proposals import Proposal, Report
 from bifocal.collimation.records import SurveyState
 from bifocal.model.pair import Pair
 
@@ -20,7 +21,7 @@ class SurveyOnPage(Protocol):
     state: SurveyState
     pictures: Pictures
     products: Products
-    proposal: dict[str, Any] | None
+    proposal: Proposal | None
 
     @property
     def proposed_path(self) -> Path | None:
@@ -32,10 +33,10 @@ class SurveyOnPage(Protocol):
         """The orientation that the workbook is written for; None before one is accepted."""
         ...
 
-    def take_files(self, pair: Path | None, proposal: dict[str, Any] | None) -> None:
+    def take_files(self, pair: Path | None, proposal: Proposal | None) -> None:
         """Let this be the pair file of the photos shown, or what is proposed instead."""
 
-    def note_proposed(self, path: Path, report: Mapping[str, Any]) -> None:
+    def note_proposed(self, path: Path, report: Report) -> None:
         """Let a pair file be the orientation that waits to be accepted."""
 
     def note_made(

@@ -123,7 +123,7 @@ class Faces:
             return cls.from_dict(data)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Faces:
+    def from_dict(cls, data: Mapping[str, object]) -> Faces:
         """Return what a GeoJSON object holds; raise as `read`."""
         items = data.get("features", [data])
         if not isinstance(items, list):
@@ -137,7 +137,7 @@ class Faces:
                 raise InputError(remark("faces.unusable", number=number, why=_why(error))) from None
         return cls(*(tuple(shapes[kind]) for kind in ("face", "break", "occluder")))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as a GeoJSON object."""
         features = [*map(_face_feature, self.faces)]
         for edge in self.breaks:
@@ -221,8 +221,8 @@ def _shape_of(item: Mapping[str, Any]) -> tuple[Kind, Face | BreakLine | Occlude
     )
 
 
-def _face_feature(face: Face) -> dict[str, Any]:
-    more: dict[str, Any] = {}
+def _face_feature(face: Face) -> dict[str, object]:
+    more: dict[str, object] = {}
     if face.plane is not None and not face.plane[1:].any():
         more["relief"] = float(face.plane[0])
     elif face.plane is not None:
@@ -233,7 +233,7 @@ def _face_feature(face: Face) -> dict[str, Any]:
     return _feature("face", face.name, "Polygon", _closed(face.rings), **more)
 
 
-def _feature(kind: Kind, name: str, form: str, parts: Any, **more: Any) -> dict[str, Any]:
+def _feature(kind: Kind, name: str, form: str, parts: Any, **more: Any) -> dict[str, object]:
     named = {"name": name} if name else {}
     return {
         "type": "Feature",

@@ -94,7 +94,7 @@ class Photo:
     layers: Layers | None = None
     z0: float | None = None
     interface_normal: FloatArray | None = None
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, object] = field(default_factory=dict)
     folder: Path = Path()
     #: What the rays cross on their way; follows from the above.
     media: MediaPath | None = field(default=None, init=False)

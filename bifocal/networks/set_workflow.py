@@ -95,9 +95,9 @@ def align_photo_set(
         extra = dict(photo.extra)
         if photo.lens is not None:
             shared = oriented.first.lens[k]
-            extra["lens"] = f"{stem}.lens{shared + 1}.json"
+            extra["lens"] = lens = f"{stem}.lens{shared + 1}.json"
             if shared == k:
-                photo.lens.write(out.parent / extra["lens"], overwrite=overwrite)
+                photo.lens.write(out.parent / lens, overwrite=overwrite)
         file = relative_name(path, out.parent)
         entries.append(replace(photo, file=file, name=name if alike else "", extra=extra))
     photo_set = PhotoSet(

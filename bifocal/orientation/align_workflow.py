@@ -232,7 +232,7 @@ def align_photos(
     return alignment
 
 
-def alignment_as_dict(alignment: Alignment) -> dict[str, Any]:
+def alignment_as_dict(alignment: Alignment) -> dict[str, object]:
     """Return an alignment as plain data for ``--json``."""
     pair = alignment.pair
     return {

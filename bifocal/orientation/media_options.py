@@ -46,7 +46,7 @@ def _prior(text: str) -> tuple[str, float]:
     return name, float(np.radians(sigma)) if name in LEANS else sigma
 
 
-def _own(options: Mapping[str, Any], name: str, number: int) -> Any:
+def _own(options: Mapping[str, object], name: str, number: int) -> Any:
     """Return an option of one camera, or else that of both."""
     of_photo = options.get(f"{name}{number}")
     return options.get(name) if of_photo is None else of_photo

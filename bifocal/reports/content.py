@@ -75,7 +75,7 @@ class StepTold:
     machine: str
 
     @classmethod
-    def of(cls, name: str, options: Mapping[str, Any], timed: Timed | None = None) -> StepTold:
+    def of(cls, name: str, options: Mapping[str, object], timed: Timed | None = None) -> StepTold:
         """Return it from the options of a survey's step."""
         return cls(
             name=name,

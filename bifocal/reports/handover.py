@@ -170,7 +170,7 @@ def _page(shown: _Shown, task: HandoverTask, source: Path, factor: float) -> str
     return Template(page).safe_substitute(escaped, data=content)
 
 
-def _layer(name: str, picture: ByteArray, bounds: Bounds | None) -> dict[str, Any]:
+def _layer(name: str, picture: ByteArray, bounds: Bounds | None) -> dict[str, object]:
     """Return a picture for the page; ``bounds`` on the plane where it lies there. [m]"""
     height, width = picture.shape[:2]
     bgr = picture if picture.ndim == 2 else picture[..., ::-1]
@@ -179,7 +179,7 @@ def _layer(name: str, picture: ByteArray, bounds: Bounds | None) -> dict[str, An
     return {"name": name, "image": address, "width": width, "height": height, "bounds": bounds}
 
 
-def _relief(relief: ReliefMap, factor: float) -> tuple[dict[str, Any], ByteArray]:
+def _relief(relief: ReliefMap, factor: float) -> tuple[dict[str, object], ByteArray]:
     """Return relief as numbers in a picture (red, green: steps of `UNIT`), and shaded."""
     step = max(1, -(-max(relief.shape) // round(factor * RELIEF)))
     r = np.ascontiguousarray(relief.r[::step, ::step])

@@ -135,10 +135,10 @@ class _Time:
     machine: str
 
 
-def _remembered(home: Path, task: ReportTask) -> dict[str, Any]:
+def _remembered(home: Path, task: ReportTask) -> dict[str, object]:
     """Return what the records of a pair's steps tell, and the task does not say otherwise."""
     steps: list[StepTold] = []
-    remembered: dict[str, Any] = {}
+    remembered: dict[str, object] = {}
     for path in (home / name / ".made.json" for name in OF_STEP):
         if not path.is_file():
             continue

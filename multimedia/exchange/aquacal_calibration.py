@@ -27,7 +27,7 @@ from photocore.sections import FileSection
 
 VERSION = "1.0"
 #: What its reader insists on and a project does not have; kept from a file that was imported.
-_NEEDED: Mapping[str, Any] = {
+_NEEDED: Mapping[str, object] = {
     "board": {"squares_x": 0, "squares_y": 0, "square_size": 0.0, "marker_size": 0.0,
               "dictionary": ""},
     "diagnostics": {"reprojection_error_rms": 0.0, "reprojection_error_per_camera": {},
@@ -38,7 +38,7 @@ _NEEDED: Mapping[str, Any] = {
 _LEVEL = 1e-9
 
 
-def is_aquacal(data: Mapping[str, Any]) -> bool:
+def is_aquacal(data: Mapping[str, object]) -> bool:
     """Whether a JSON object is a calibration of AquaCal."""
     return isinstance(data.get("cameras"), Mapping) and "interface" in data
 

@@ -169,9 +169,9 @@ def write_project(path: Path | str, project: Project, *, overwrite: bool = False
     return [path, *tables]
 
 
-def project_data(project: Project, folder: Path) -> dict[str, Any]:
+def project_data(project: Project, folder: Path) -> dict[str, object]:
     """Return the content of the project file in a folder, without the names of the tables."""
-    data: dict[str, Any] = {"format": FORMAT}
+    data: dict[str, object] = {"format": FORMAT}
     if project.name:
         data["name"] = project.name
     data["unit"] = project.unit
@@ -188,14 +188,14 @@ def project_data(project: Project, folder: Path) -> dict[str, Any]:
 _OF_MEDIA = frozenset(("layers", "indices", "thicknesses", "surfaces", "medium", "gradient"))
 
 
-def _toml(path: Path) -> dict[str, Any]:
+def _toml(path: Path) -> dict[str, object]:
     check_name(path)
     if path.is_dir():
         raise InputError(remark("project.is_folder", of=path))
     return read_toml(path, "project file")
 
 
-def _project(data: dict[str, Any], folder: Path) -> Project:
+def _project(data: dict[str, object], folder: Path) -> Project:
     form = data.pop("format", None)
     if form != FORMAT:
         raise InputError(f'format must be "{FORMAT}", found {form!r}.')
@@ -241,7 +241,7 @@ def _project(data: dict[str, Any], folder: Path) -> Project:
     )
 
 
-def _sigma(data: dict[str, Any], cameras: tuple[Camera, ...]) -> float:
+def _sigma(data: dict[str, object], cameras: tuple[Camera, ...]) -> float:
     """Return the precision of an image coordinate: as given, else half a pixel. [mm]"""
     if "sigma_image" in data:
         value = FileSection(data, "project").number("sigma_image")
@@ -313,7 +313,7 @@ def _surface(item: Any, place: str, folder: Path) -> tuple[RefractingSurface, bo
     return surface, section.flag("moves_with_camera")
 
 
-def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, Any]:
+def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, object]:
     if isinstance(media, Interfaces):
         graded = {key: getattr(media, name) for key, name in _GRADED.items() if media.is_graded}
         return {
@@ -328,7 +328,7 @@ def _media_data(media: FlatInterface | Interfaces, folder: Path) -> dict[str, An
     return {**media.layers.as_dict(), **_plain(media, "point", "normal"), **moves}
 
 
-def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
+def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, object]:
     kind = next((kind for kind, (form, _) in _KINDS.items() if type(surface) is form), "")
     if isinstance(surface, WaveSurface):
         return {"kind": kind, "level": float(surface.level), "waves": wave_rows(surface)}
@@ -343,7 +343,7 @@ def _surface_data(surface: RefractingSurface, folder: Path) -> dict[str, Any]:
     )
 
 
-def _plain(value: object, *keys: str) -> dict[str, Any]:
+def _plain(value: object, *keys: str) -> dict[str, object]:
     """Return attributes as a file holds them."""
     return {key: np.asarray(getattr(value, key)).tolist() for key in keys}
 

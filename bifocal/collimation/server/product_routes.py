@@ -46,7 +46,7 @@ async def _photos(request: Request) -> Response:
         sent = [form.get(f"photo{number}") for number in range(1, MOST + 1)]
         files = [(each.filename or "", each.file) for each in sent if isinstance(each, UploadFile)]
 
-        def take() -> dict[str, Any]:
+        def take() -> dict[str, object]:
             present = session.all_photos
             further = len(present) > 1 and len(files) == 1
             if not further:
@@ -188,8 +188,8 @@ async def _value(request: Request) -> Response:
         raise FieldError("X, Y: a place on the wall, in metres.")
     session = session_of(request)
 
-    def value() -> dict[str, Any]:
-        facts: dict[str, Any] = dict(session.products.value(x, y))
+    def value() -> dict[str, object]:
+        facts: dict[str, object] = dict(session.products.value(x, y))
         if facts["r"] is not None:
             place = np.array([[x, y, facts["r"]]])
             facts["picks"] = [one[0] for one in session.pictures.needed_pair().project(place)]
@@ -204,7 +204,7 @@ async def _met(request: Request) -> Response:
     pixels = as_points(body.get("pixels") or [], "pixels", dimension=2).reshape(-1, 2)
     session = session_of(request)
 
-    def find() -> dict[str, Any]:
+    def find() -> dict[str, object]:
         pair = session.pictures.needed_pair()
         if session.products.current("relief") is None:
             places, within = places_of(pair, np.insert(pixels, 2, 0.0, axis=1).tolist()), None

@@ -14,7 +14,7 @@ from bifocal.collimation.drawn_lengths import lengths_shown
 from bifocal.collimation.fields import SETUP
 from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.next_steps import advice_of, is_looking, next_steps
-from bifocal.collimation.product_graph import GRAPH, out_of_date, proposal_is_current
+from bifocal.collimation.product_graph import GRAPH, out_of_date, proposal_is_current, report_of
 from bifocal.collimation.records import GIVES_SCALE
 from bifocal.collimation.scale import free_report, is_unscaled
 from bifocal.collimation.session import Session
@@ -185,7 +185,7 @@ def _others(session: Session) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
+def _exchanged(session: Session, shown: list[dict[str, object]]) -> bool:
     """Whether lenses or distances say that the far photo is the near one."""
     first, second = (session.state.setup.get(key) for key in ("d1", "d2"))
     nearer = first is not None and second is not None and first < second
@@ -194,7 +194,7 @@ def _exchanged(session: Session, shown: list[dict[str, Any]]) -> bool:
 
 def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
     """Say where the focal length comes from and how far it is to be trusted."""
-    language, report = session.spoken, (session.proposal or {}).get("report", {})
+    language, report = session.spoken, report_of(session)
     if session.pictures.pair is not None and "focal_px" in report:
         focal = report["focal_px"][number - 1]
         share = 100 * report["standard_deviations"].get(f"focal{number}", 0.0) / focal
@@ -301,7 +301,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, object]:
 
 def _remarks(session: Session) -> list[str]:
     """Return what is said of the pair, the worst first."""
-    pair, report = session.pictures.pair, (session.proposal or {}).get("report", {})
+    pair, report = session.pictures.pair, report_of(session)
     pasted = (text for paste in session.state.pasted.values() for text in paste.remarks)
     held = (*pasted, *report.get("remarks", ()), *(pair.remarks if pair else ()))
     remarks = dict.fromkeys(held)

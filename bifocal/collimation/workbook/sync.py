@@ -84,7 +84,7 @@ class WorkbookSync:
         self.survey = survey
         self.waiting: str | None = None
         self.synced: dict[str, PointRow] = {}
-        self.outlines: dict[str, Any] = {}
+        self.outlines: dict[str, object] = {}
         self.digest = ""
         self.seen = ""
         self.read: ReadBook | None = None

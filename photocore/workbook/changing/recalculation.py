@@ -30,7 +30,7 @@ _ROWS = 2**20
 _ALIKE = 1e-6
 
 
-def examine(path: Path, program: str | None) -> dict[str, Any]:
+def examine(path: Path, program: str | None) -> dict[str, object]:
     """Return what is wrong with a workbook; the file stays as it is.
 
     Parameters
