@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from bifocal.collimation.proposals import Proposal
+from bifocal.collimation.proposals import Proposal, ProposalAside
 from bifocal.collimation.records import Change, PickedControl, PickedPoint, SurveyState
 from bifocal.collimation.shapes import places_of
 from bifocal.collimation.survey_on_page import SurveyOnPage
@@ -160,7 +160,7 @@ def put_aside(session: SurveyOnPage) -> None:
     session.pictures.show_photos([info.path for info in session.pictures.infos][::-1])
 
 
-def _unchanged(folder: Path, proposal: Mapping[str, object] | None) -> Proposal | None:
+def _unchanged(folder: Path, proposal: ProposalAside | None) -> Proposal | None:
     """Return an orientation that was proposed, if its file is still the same."""
     path = folder / proposal["pair"] if proposal else None
     if proposal is None or path is None or not path.is_file():

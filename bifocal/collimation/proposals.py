@@ -76,6 +76,12 @@ class Proposal(TypedDict):
     report: Report
 
 
+class ProposalAside(Proposal):
+    """One that an exchange put aside, with the digest of its file."""
+
+    sha256: str
+
+
 def rescale(path: Path, report: Report, measure: list[Any] | None) -> Report:
     """Bring a proposed pair file to the scale of a measure and return the report of it."""
     if measure is None:
