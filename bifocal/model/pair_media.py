@@ -381,16 +381,6 @@ class PairMedia:
         rate = self.layers.indices[-1] / self.layers.indices[0] if stays else 1.0
         return straight(self.foot(number, camera)).distance, rate
 
-    def of_photo(self, number: int, camera: Pinhole) -> MediaOfPhoto:
-        """Return what the photo of camera 0 or 1 states of them; nothing in air."""
-        if not self:
-            return {}
-        return {
-            "layers": self.layers,
-            "z0": self.z0(number, camera),
-            "interface_normal": self.normal(number, camera),
-        }
-
     def rates_by_unknowns(self, rates: FloatArray) -> FloatArray:
         """Return rates by what `counted` names, (..., k), by the unknowns `names`, (..., u)."""
         return rates @ self.by_unknowns() if self else rates
@@ -426,6 +416,17 @@ class PairMedia:
                 elif stays and (name == "depth" or name.startswith("thickness")):
                     out[z0, column] = -1.0
         return out
+
+
+def stated_by_photo(media: PairMedia, number: int, camera: Pinhole) -> MediaOfPhoto:
+    """Return what the photo of camera 0 or 1 states of its media; nothing in air."""
+    if not media:
+        return {}
+    return {
+        "layers": media.layers,
+        "z0": media.z0(number, camera),
+        "interface_normal": media.normal(number, camera),
+    }
 
 
 def _unknowns(name: str) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from bifocal.files.photos import photo_info
 from bifocal.matching.features import Features, find_features
 from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
 from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model.pair_media import PairMedia, stated_by_photo
 from bifocal.model.photo import Photo
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
 from bifocal.networks.joint_control import NamedPositions, name_of, named_positions
@@ -409,7 +409,7 @@ def _adjusted_photo(photo: Photo, camera: Pinhole, media: PairMedia, side: int) 
     distance = float(camera.centre[2])
     return replace(
         photo, plane_from_pixel=plane_from_pixel(camera), nadir=camera.centre[:2],
-        distance=distance, **media.of_photo(side, camera),
+        distance=distance, **stated_by_photo(media, side, camera),
         principal_distance=None if c is None else stretch * c,
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ from bifocal.model.interior_orientation import Cameras, Interior
 from bifocal.model.lens import Lens
 from bifocal.model.orientation_precision import CAMERA, NAMES, moved
 from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model.pair_media import PairMedia, stated_by_photo
 from bifocal.model.photo import Photo
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
@@ -231,7 +231,7 @@ def photo_of(
         image_size=interior.image_size,
         principal_distance=None if pitch is None else float(camera.matrix[0, 0]) * pitch,
         pixel_size=pitch,
-        **media.of_photo(number, camera),
+        **stated_by_photo(media, number, camera),
     )
 
 

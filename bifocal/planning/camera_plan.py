@@ -9,7 +9,7 @@ import numpy as np
 
 from bifocal.model.basis import rests_on
 from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model.pair_media import PairMedia, stated_by_photo
 from bifocal.model.photo_set import PhotoSet
 from photocore.arrays import FloatArray, positive
 from photocore.camera.pinhole import Pinhole
@@ -242,7 +242,10 @@ def planned_pair(
         return pair
     square_on = np.diag([1.0, -1.0, -1.0])
     first, second = (
-        replace(photo, **media.of_photo(k, Pinhole(np.eye(3), square_on, np.array([0, 0, d[k]]))))
+        replace(
+            photo,
+            **stated_by_photo(media, k, Pinhole(np.eye(3), square_on, np.array([0, 0, d[k]]))),
+        )
         for k, photo in enumerate((pair.image1, pair.image2))
     )
     return Pair(image1=first, image2=second)
