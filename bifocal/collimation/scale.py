@@ -9,10 +9,15 @@ from bifocal.collimation.survey_on_page import SurveyOnPage
 from photocore.output import free_path
 
 
-def free_report(session: SurveyOnPage) -> Report | None:
-    """Return what was reported of the orientation, if the photos alone gave it."""
+def kept_report(session: SurveyOnPage) -> Report:
+    """Return what was reported of the orientation shown; empty where a file gave it."""
     record = session.proposal or session.state.orientation.get("pair") or {}
-    report = cast("Report", record.get("report", {}))
+    return cast("Report", record.get("report") or {})
+
+
+def free_report(session: SurveyOnPage) -> Report | None:
+    """Return the same if the photos alone gave it."""
+    report = kept_report(session)
     return report if report.get("free_scale") else None
 
 

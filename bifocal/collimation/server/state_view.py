@@ -16,7 +16,7 @@ from bifocal.collimation.live_orientation import LiveOrientation, lenses_of
 from bifocal.collimation.next_steps import advice_of, is_looking, next_steps
 from bifocal.collimation.product_graph import GRAPH, out_of_date, proposal_is_current, report_of
 from bifocal.collimation.records import GIVES_SCALE
-from bifocal.collimation.scale import free_report, is_unscaled
+from bifocal.collimation.scale import free_report, is_unscaled, kept_report
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
@@ -194,7 +194,7 @@ def _exchanged(session: Session, shown: list[dict[str, object]]) -> bool:
 
 def _focal_said(session: Session, number: int, info: ImageInfo) -> str:
     """Say where the focal length comes from and how far it is to be trusted."""
-    language, report = session.spoken, report_of(session)
+    language, report = session.spoken, kept_report(session)
     if session.pictures.pair is not None and "focal_px" in report:
         focal = report["focal_px"][number - 1]
         share = 100 * report["standard_deviations"].get(f"focal{number}", 0.0) / focal
@@ -292,7 +292,7 @@ def _pair(session: Session, pair: Pair) -> dict[str, object]:
             "accepted": session.proposed_path is None,
             "current": proposal_is_current(session),
             "scaled": not is_unscaled(session),
-            "report": session.proposal and session.proposal["report"],
+            "report": kept_report(session) or None,
             "free_scale": free_report(session) is not None,
             "remarks": [without_options(text, session.spoken) for text in _remarks(session)],
         }

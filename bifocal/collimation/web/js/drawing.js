@@ -4,6 +4,8 @@ export const INK = { 1: "#63c7ff", 2: "#ffb454" };
 const HATCH = 9;
 const sprites = new Map();
 const DARK = "rgba(0, 0, 0, 0.75)";
+/** Room for a text's rim, and texts and markers that are kept. */
+const [RIM, MOST] = [3, 4000];
 /** Letters of a name beside its mark, at most. */
 const LONGEST = 18;
 /** Of what does not fit. */
@@ -17,6 +19,8 @@ const measureUnit = () => {
 };
 window.addEventListener("resize", measureUnit);
 measureUnit();
+
+const FONT = () => `500 ${12 * unit}px system-ui, sans-serif`;
 
 function stroke(context, style, width, path) {
   context.beginPath();
@@ -86,14 +90,33 @@ export function polyline(context, style, places, { width = 2, dash = [], closed 
   context.setLineDash([]);
 }
 
+/** A text with its dark rim, drawn once: a thousand names in every frame. */
+function lettering(text, style) {
+  const ratio = window.devicePixelRatio;
+  const key = `${ratio}/${style}/${text}`;
+  let canvas = sprites.get(key);
+  if (!canvas) {
+    if (sprites.size > MOST) sprites.clear();
+    canvas = document.createElement("canvas");
+    const context = canvas.getContext("2d");
+    context.font = FONT();
+    canvas.wide = context.measureText(text).width;
+    canvas.width = Math.ceil((canvas.wide + 2 * RIM) * ratio);
+    canvas.height = Math.ceil(20 * unit * ratio);
+    context.scale(ratio, ratio);
+    Object.assign(context, { font: FONT(), lineJoin: "round", lineWidth: 3, strokeStyle: DARK, fillStyle: style });
+    context.strokeText(text, RIM, 14 * unit);
+    context.fillText(text, RIM, 14 * unit);
+    sprites.set(key, canvas);
+  }
+  return canvas;
+}
+
 export function label(context, text, [x, y], style = "#ffffff") {
-  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
-  context.lineJoin = "round";
-  context.lineWidth = 3;
-  context.strokeStyle = DARK;
-  context.strokeText(text, x, y);
-  context.fillStyle = style;
-  context.fillText(text, x, y);
+  const canvas = lettering(text, style);
+  const ratio = window.devicePixelRatio;
+  const [left, top] = [x - RIM, y - 14 * unit].map((value) => Math.round(value * ratio) / ratio);
+  context.drawImage(canvas, left, top, canvas.width / ratio, canvas.height / ratio);
 }
 
 /** A line of equal precision, thin at every zoom, its number where it is seen. */
@@ -126,11 +149,7 @@ export function centre(context, [x, y], text) {
     path.moveTo(x, y - 12);
     path.lineTo(x, y + 12);
   });
-  // Within the picture, also at its edge.
-  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
-  const { width } = context.measureText(text);
-  const room = context.canvas.width / window.devicePixelRatio - 6;
-  label(context, text, [x + 10 + width > room ? x - 10 - width : x + 10, y - 10]);
+  beside(context, text, [x, y], 10, "#ffffff", true);
 }
 
 /**
@@ -161,29 +180,30 @@ export function picks(context, pane, { items, images, pick, selected, doubtful =
       if (last[1][index]) marker(context, image, last[1][index], { selected: true, ink: inkOf(last[0], image) });
     });
   }
-  names(context, pane, (last ? [last, ...seen.filter((one) => one !== last)] : seen)
-    .map(([item, places]) => [item.name, places.find(Boolean), item.name === selected ? 15 : 9]));
+  for (const [{ name }, places] of last ? [last, ...seen.filter((one) => one !== last)] : seen) {
+    beside(context, name, places.find(Boolean), name === selected ? 15 : 9);
+  }
 }
 
-/** Names beside their marks, on whichever side is free; none over another, long ones without their middle. */
-function names(context, pane, marks) {
-  const rows = new Map();
-  context.font = `500 ${12 * unit}px system-ui, sans-serif`;
+/**
+ * A text beside its mark, on whichever side is free: within the picture, over no other; on none
+ * unless it is `needed`. Long ones go without their middle.
+ */
+export function beside(context, name, [x, y], gap, style = "#ffffff", needed = false) {
+  const text = name.length > LONGEST ? `${name.slice(0, LONGEST / 2)}…${name.slice(1 - LONGEST / 2)}` : name;
+  const { wide: width } = lettering(text, style);
   const height = 14 * unit;
-  for (const [name, [x, y], gap] of marks) {
-    const text = name.length > LONGEST ? `${name.slice(0, LONGEST / 2)}…${name.slice(1 - LONGEST / 2)}` : name;
-    const { width } = context.measureText(text);
-    const sides = [[gap, -8], [gap, 17], [-gap, -8], [-gap, 17]].map(([dx, dy]) =>
-      [x + dx * unit - (dx < 0 ? width : 0), y + dy * unit]);
-    const free = sides.find(([left, base]) => left >= 0 && left + width <= pane.width && [-1, 0, 1].every((near) =>
-      (rows.get(Math.round(base / height) + near) ?? []).every(([from, to, at]) =>
-        to < left || from > left + width || Math.abs(at - base) >= height)));
-    if (!free) continue;
-    label(context, text, free);
-    const row = Math.round(free[1] / height);
-    if (!rows.has(row)) rows.set(row, []);
-    rows.get(row).push([free[0], free[0] + width, free[1]]);
-  }
+  const room = context.canvas.width / window.devicePixelRatio;
+  const sides = [[gap, -8], [gap, 17], [-gap, -8], [-gap, 17]].map(([dx, dy]) =>
+    [x + dx * unit - (dx < 0 ? width : 0), y + dy * unit]).filter(([left]) => left >= 0 && left + width <= room);
+  const free = sides.find(([left, base]) => [-1, 0, 1].every((near) =>
+    (context.texts.get(Math.round(base / height) + near) ?? []).every(([from, to, at]) =>
+      to < left || from > left + width || Math.abs(at - base) >= height))) ?? (needed && sides[0]);
+  if (!free) return;
+  label(context, text, free, style);
+  const row = Math.round(free[1] / height);
+  if (!context.texts.has(row)) context.texts.set(row, []);
+  context.texts.get(row).push([free[0], free[0] + width, free[1]]);
 }
 
 const inside = (pane, [x, y]) => x > -20 && y > -20 && x < pane.width + 20 && y < pane.height + 20;

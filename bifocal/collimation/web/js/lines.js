@@ -3,11 +3,9 @@ import { h, html, number, render, repeat } from "./dom.js";
 import { cross, textField } from "./fields.js";
 import { t } from "./words/words.js";
 
-const LAYERS = ["windows", "cornices", "doors", "edges"];
-
 export class Lines {
   constructor(app, picker) {
-    Object.assign(this, { app, picker, current: null, first: null });
+    Object.assign(this, { app, picker, current: null, first: null, layers: t("line.layers").split(", ") });
     this.element = h("section", { class: "card" });
   }
 
@@ -32,7 +30,7 @@ export class Lines {
     if (!this.current) this.begin();
     const line = this.#line;
     const { points = this.first ? [this.first] : [], closed = false } = line ?? {};
-    const layer = line?.layer ?? (this.element.querySelector("#line-layer").value || LAYERS[0]);
+    const layer = line?.layer ?? (this.element.querySelector("#line-layer").value || this.layers[0]);
     if (points.at(-1) === selected) return undefined;
     if (points.length > 2 && points[0] === selected) return this.#set({ layer, points, closed: true });
     this.first = points.length ? null : selected;
@@ -52,8 +50,8 @@ export class Lines {
 
   update() {
     const inHand = this.#line?.points.join(" – ") ?? this.first ?? "";
-    render(html`<h2>${t("line.title")}</h2><datalist id="layer-names">${LAYERS.map((name) => html`<option value=${name}></option>`)}</datalist>
-      <div class="row"><label for="line-layer">${t("line.layer")}</label><input type="text" value=${LAYERS[0]} list="layer-names" id="line-layer">
+    render(html`<h2>${t("line.title")}</h2><datalist id="layer-names">${this.layers.map((name) => html`<option value=${name}></option>`)}</datalist>
+      <div class="row"><label for="line-layer">${t("line.layer")}</label><input type="text" value=${this.layers[0]} list="layer-names" id="line-layer">
         <button type="button" class="quiet" data-testid="line-new" @click=${() => this.begin()}>${t("line.new")}</button>
         <button type="button" class="quiet" data-testid="line-add" @click=${() => this.add()}>${t("line.add")}</button></div>
       <p class="hint" role="status">${this.current ? t("line.inHand", { name: this.current, corners: inHand }) : t("line.hint")}</p>

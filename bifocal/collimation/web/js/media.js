@@ -3,7 +3,7 @@
  * bifocal/media.py. Places are (X, Y) in metres; "apparent" is where the ray would meet the plane
  * if it went straight on in the first medium.
  */
-import { number } from "./dom.js";
+import { number } from "./numbers.js";
 
 const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 

@@ -196,6 +196,10 @@ export class OrientationStage {
     this.prepare(state).catch((error) => this.app.refuse(error));
     this.picker.settle();
     this.wallCard.update(state);
+    // What is accepted needs no control points: a click makes one only where it is asked for.
+    const done = Boolean(state.pair?.accepted) && !state.control.length;
+    if (done && !this.done) this.picker.picking = false;
+    this.done = done;
     this.refresh();
   }
 

@@ -195,6 +195,7 @@ export class Pane extends EventTarget {
     this.stale = false;
     const context = this.#cleared(this.canvas, ratio);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.texts = new Map();
     this.painter(context, this);
   }
 

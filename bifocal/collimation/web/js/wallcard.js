@@ -209,7 +209,7 @@ export class WallCard {
       for (const place of places) drawing.marker(context, pane.image, place);
       const [a, b] = places;
       const text = drawn.length ? `${number(drawn.length, 3)} m` : t("wall.howLong");
-      if (b) drawing.label(context, text, [(a[0] + b[0]) / 2 + 8, (a[1] + b[1]) / 2 - 8], ink);
+      if (b) drawing.beside(context, text, [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], 8, ink, true);
     }
   }
 }

@@ -160,6 +160,7 @@ export default {
   "list.delete": "Löschen",
   "list.deleteOf": "{name} löschen",
   "line.title": "Linien",
+  "line.layers": "Fenster, Gesimse, Türen, Kanten",
   "line.layer": "Layer",
   "line.new": "Neue Linie",
   "line.add": "Punkt anfügen",

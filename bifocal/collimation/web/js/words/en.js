@@ -160,6 +160,7 @@ export default {
   "list.delete": "Delete",
   "list.deleteOf": "Delete {name}",
   "line.title": "Lines",
+  "line.layers": "windows, cornices, doors, edges",
   "line.layer": "Layer",
   "line.new": "New line",
   "line.add": "Add point",

@@ -160,6 +160,7 @@ export default {
   "list.delete": "Elimina",
   "list.deleteOf": "Elimina {name}",
   "line.title": "Linee",
+  "line.layers": "finestre, cornici, porte, spigoli",
   "line.layer": "Layer",
   "line.new": "Nuova linea",
   "line.add": "Aggiungi punto",
