@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bifocal import Grid, InputError, Pair, PhotoSet, Quality, ReliefMap, dense_relief
-from bifocal.relief_maps import fusion
+from bifocal.relief_maps import fusion, set_relief
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.fusion import FUSION, PairRelief, fused
 from bifocal.relief_maps.photo_evidence import Witness
+from bifocal.relief_maps.registration import Registration
 from bifocal.relief_maps.turned_plane import TurnedPlane
 from tests.scenes import Exposure, bifocal_cameras, facade
 from tests.scenes.sets import SetRendering, aside, render_set
@@ -140,6 +142,27 @@ def test_pairs_that_agree_are_averaged_by_weight_and_promise_no_more_than_either
     np.testing.assert_allclose(both.r, 0.012, atol=1e-6)
     assert (both.quality == Quality.MEASURED).all()
     assert (both.sigma >= 0.004).all()
+
+
+def test_a_set_fits_as_its_worst_pair_and_is_as_sure_of_scale_as_its_best(monkeypatch):
+    """Pairs of one map, whose photos misfit by 0.2, 0.5 and 0.1 px; the last has no base."""
+    fits = iter([(0.2, 0.02, 1.5), (0.5, 0.03, 1.4), (0.1, 0.01, 0.0)])
+
+    def measured(*_):
+        systematic, per_scale, base = next(fits)
+        registration = Registration(
+            matched=0.9, across_median=0.1, shift=(0.0, 0.0), rotation=0.0, systematic=systematic,
+            wall=0.0, false_relief_per_scale=per_scale, base=base,
+        )  # fmt: skip
+        return SimpleNamespace(registration=registration, working_gsd=0.02), pair_relief(0.0, 0.01)
+
+    monkeypatch.setattr(set_relief, "_measured", measured)
+    monkeypatch.setattr(set_relief, "_best_pairs", lambda *_: ((0, 1), (0, 2), (1, 2)))
+    taken = shot()
+    whole = dense_relief(
+        taken.photos, *taken.images, gsd=GRID.gsd, bounds=(-0.5, -0.5, 0.5, 0.5)
+    ).registration
+    assert (whole.systematic, whole.false_relief_per_scale, whole.base) == (0.5, 0.01, 0.0)
 
 
 def test_pairs_that_differ_are_unknown_where_photos_cannot_decide():

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bifocal import SAMPLE, Grid, ReliefMap
+from bifocal import SAMPLE, Grid, Pair, ReliefMap
 from bifocal.model.geotiff import create_raster
 from bifocal.orientation.walls.wall_shape import WallShape, shape_in_words
 from bifocal.remarks import in_language, remark
+from bifocal.reports import content as content_module
 from bifocal.reports.accuracy import accuracy_blocks, verdict_in_words
 from bifocal.reports.content import _basis, read_content
 from bifocal.reports.pair_report import _provenance, pair_blocks, report_document
@@ -415,3 +416,13 @@ def test_tables_that_name_the_photos_the_other_way_round_give_the_same_points(ta
     ]
     np.testing.assert_array_equal(found[0], found[2])
     np.testing.assert_array_equal(found[1], found[2])
+
+
+def test_photos_are_shown_small_and_never_enlarged(monkeypatch):
+    """Photos of 1536 x 1024 px in pictures of at most 100 px, and of at most 2000 px."""
+    pair = Pair.read(SAMPLE / "facade.pair.json")
+    for most, shape, reduction in ((100, (67, 100), 15.36), (2000, (1024, 1536), 1.0)):
+        monkeypatch.setattr(content_module, "SIDE", most)
+        for photo in content_module._photos(pair):
+            assert photo.picture.shape[:2] == shape
+            assert (photo.size, photo.reduction) == ((1536, 1024), reduction)

@@ -191,3 +191,14 @@ def test_a_workbook_whose_points_lack_sigmas_of_the_world_keeps_its_own_formulas
         assert "g_z_E" in str(formulas.cell(row, 11).value)
         sigmas = [shown.cell(row, column).value for column in (11, 12, 13)]
         assert sigmas == pytest.approx(solved.world_sigma[row - 5], rel=1e-9)
+
+
+def test_a_number_typed_as_text_becomes_one_and_a_name_of_digits_stays_text(tmp_path):
+    path = fill(tmp_path / "s.xlsx", [("007", 4.2424, 0, 4.4706, 0), ("B", 3.0, 1, 3.1, 1)])
+    book = openpyxl.load_workbook(path)
+    book["Points"]["B5"], book["Points"]["E5"] = "4,2424", "0,5"
+    book.save(path)
+    result = run("solve", path, "--out", path, "--overwrite")
+    assert result.exit_code == 0, result.stderr
+    sheet = openpyxl.load_workbook(path)["Points"]
+    assert [sheet[cell].value for cell in ("A5", "B5", "E5", "A6")] == ["007", 4.2424, 0.5, "B"]

@@ -18,7 +18,7 @@ from multimedia import (
     bundle_adjust,
 )
 from multimedia.media.camera import EXTERIOR
-from multimedia.orientation.stray_rays import without_rows
+from multimedia.orientation.stray_rays import _ends_apart, without_rows
 from tests.multimedia import tank
 from tests.multimedia.adjustment.test_start_poses import FREE, NOISE, waved
 
@@ -121,3 +121,23 @@ def test_they_are_named_beside_a_result_that_has_followed_them():
     words = " ".join(bundle_adjust(project, Unknowns()).remarks)
     for name in ("p7 in cam2", "p3 in cam3", "p12 in cam3"):
         assert name in words
+
+
+@pytest.mark.parametrize(("off", "apart"), [(10.0, False), (20.0, True)])
+def test_ends_are_apart_beyond_what_the_noise_of_rays_explains(off, apart):
+    """Two cameras 2 m before points whose distances are exact but one; a ray is good to 1 mm."""
+    origins = np.array([[[-0.5, 0.0, 2.0]], [[0.5, 0.0, 2.0]]])
+    ends = np.array(
+        [[0.0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0.1, 0.4, 0], [0.3, 0.3, 0], [0, 0, 1]]
+    )
+    along = ends - origins
+    way = float(np.median(np.linalg.norm(along, axis=2)))
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    distances = [
+        (a, b, float(np.linalg.norm(ends["abcdef".index(a)] - ends["abcdef".index(b)])))
+        for a, b in ("ab", "cd", "ef")
+    ]
+    distances[0] = ("a", "b", 0.3 + off * 0.001)
+    strayed = _ends_apart(origins + 0 * along, along, "abcdef", distances, 0.001 / way)
+    assert strayed[:, :2].all() == strayed[:, :2].any() == apart
+    assert not strayed[:, 2:].any()
