@@ -109,6 +109,17 @@ def test_meeting_rays_are_all_that_meet_and_each_row_is_taken_once():
                 one.add(n)
 
 
+@pytest.mark.parametrize(("side", "count"), [(1.0, 1), (-1.0, 0)])
+def test_rays_meet_before_their_cameras_in_any_unit_and_never_behind(side, count):
+    """0.5 away from cameras 0.6 apart: half a metre, or half a millimetre."""
+    origins = np.array([[[-0.3, 0.0, 0.0]], [[0.3, 0.0, 0.0]]])
+    along = side * np.array([[[0.6, 0.0, 0.8]], [[-0.6, 0.0, 0.8]]])
+    width = (np.array([1e-6]), 0.0)
+    (meeting,) = meeting_rays(*zip(origins, along, strict=True), width, width)
+    assert len(meeting[0]) == count
+    np.testing.assert_allclose(meeting[2], np.tile([0.0, 0.0, 0.4], (count, 1)), atol=1e-12)
+
+
 @pytest.mark.parametrize("reach", [0.03, 2.0, 30.0])
 def test_a_map_of_targets_returns_the_nearest_within_reach(reach: float):
     rng = np.random.default_rng(15)
