@@ -1,12 +1,14 @@
 """`bifocal solve` with a pair that looks through glass and water."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from bifocal import Measuring, Pair, solve
+from bifocal.workbook.formulas.setup_cells import formulas
 from tests.bifocal.model.test_pair_through_media import PAIRS, POINTS, content
 from tests.builders.commands import bifocal_command as main
 from tests.scenes.refracted import pixels_of
@@ -92,3 +94,10 @@ def test_what_neglecting_refraction_costs_is_said():
     assert f"up to {np.abs(off[:, 2]).max():.3f} m" in said
     assert f"places by up to {np.hypot(*off[:, :2].T).max():.3f} m" in said
     assert np.abs(off[:, 2]).max() > 0.05
+
+
+@pytest.mark.parametrize("media", [2, 3, 5])
+def test_the_least_index_of_the_set_up_is_that_of_all_its_media(media):
+    """The last one may be the thinnest: air behind a pane, seen from under water."""
+    used = re.findall(r"n_used_(\d)", formulas(media=media)["n_least"])
+    assert used == [str(number) for number in range(1, media + 1)]
