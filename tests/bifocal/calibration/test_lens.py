@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from bifocal import InputError, Interior, Lens, calibrate, read_image, write_image
+from bifocal.calibration import board_photos
 from bifocal.calibration.board_calibration import Calibration, _verdict, lens_of_views
 from bifocal.calibration.lens_database import lens_from_database
 from bifocal.calibration.plumb_line import calibrate_from_lines, find_straight_edges
@@ -169,6 +170,23 @@ def test_a_photo_that_does_not_fit_is_left_out_and_named():
     )
     result = lens_of_views(views, (1024, 768))
     assert result.dropped == ("blurred",)
+
+
+def test_the_work_on_photos_of_a_board_is_told_photo_by_photo_and_never_beyond_the_whole(
+    monkeypatch,
+):
+    monkeypatch.setattr(board_photos, "detect_board", lambda *_, **__: object())
+    monkeypatch.setattr(board_photos, "lens_of_views", lambda views, *_, **__: Calibration(
+        lens=BROWN, dropped=(), standard_deviations={}, photo_rms={}, suspicious=(),
+        coverage=np.zeros((6, 8)), tried=(), verdict=f"{len(views)} views",
+    ))  # fmt: skip
+    steps: list[tuple[float, float, str]] = []
+    photos = [np.zeros((20, 30), np.uint8)] * 4
+    done = calibrate(
+        photos, board=(7, 6), names=tuple("abcd"), progress=lambda *step: steps.append(step)
+    )
+    assert done.verdict == "4 views"
+    assert steps == [*((k, 4, f"searching {'abcd'[k]}") for k in range(4)), (1, 1, "adjusting")]
 
 
 def test_few_photos_are_refused():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import multimedia as mm
 from multimedia import GeometryError, InputError
+from multimedia.bathymetry import waterlevel_workflow
 from multimedia.bathymetry.waterlevel_workflow import fit_water_level
 
 
@@ -247,3 +250,14 @@ def test_a_larger_group_below_the_highest_is_told(tmp_path) -> None:
     np.savetxt(tmp_path / "ties.csv", points, delimiter=",", header="X,Y,Z", comments="")
     remarks = fit_water_level(tmp_path / "ties.csv").remarks
     assert "tie points at about 1.200 m are a larger group than the highest one" in remarks[-1]
+
+
+@pytest.mark.parametrize(("spread", "count"), [(0.9, 0), (1.1, 1)])
+def test_heights_that_scatter_by_more_than_a_metre_are_asked_for_their_unit(
+    spread, count, tmp_path, monkeypatch
+):
+    np.savetxt(tmp_path / "ties.xyz", np.eye(3), header="X Y Z", comments="")
+    level = SimpleNamespace(spread=spread, larger=None)
+    monkeypatch.setattr(waterlevel_workflow, "mean_water_level", lambda *_, **__: level)
+    words = fit_water_level(tmp_path / "ties.xyz").remarks
+    assert len([line for line in words if "are the heights in millimetres?" in line]) == count
