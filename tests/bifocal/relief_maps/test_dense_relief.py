@@ -264,6 +264,19 @@ def test_relief_that_falls_away_outwards_is_a_ramp_and_that_which_rises_is_none(
         np.testing.assert_array_equal(falling[clear], wanted[clear])
 
 
+def test_a_pixel_covers_as_much_of_the_wall_by_bent_rays_that_are_straight():
+    frame = small_frame()
+    x, y = frame.from_centre()
+    distance = np.float32(frame.foot(1).distance)
+    straight = SimpleNamespace(
+        pair=SimpleNamespace(refracted=True), grid=frame.grid, foot=frame.foot,
+        slopes=lambda *_: (-x / distance, -y / distance),
+    )  # fmt: skip
+    relief = (0.004 * x - 0.006 * y + 0.1).astype(np.float32)
+    covered = [forward_projection.stretch(one, relief) for one in (frame, straight)]
+    np.testing.assert_allclose(covered[1], covered[0], rtol=1e-5)
+
+
 def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():
     frame = small_frame()
     coarse, factor = seed.coarse_relief(frame)
