@@ -277,6 +277,20 @@ def test_a_pixel_covers_as_much_of_the_wall_by_bent_rays_that_are_straight():
     np.testing.assert_allclose(covered[1], covered[0], rtol=1e-5)
 
 
+@pytest.mark.parametrize("reverse", [False, True])
+def test_costs_run_along_both_diagonals_alike(reverse):
+    """Of a volume of 5 x 7 places and 4 steps of relief, and the same seen in a mirror."""
+    rng = np.random.default_rng(2)
+    cost = rng.uniform(0, 30, (5, 7, 4)).astype(np.float32)
+    image = rng.uniform(0, 90, (5, 7)).astype(np.float32)
+    totals = np.zeros((2, *cost.shape), np.float32)
+    seed._add_path(cost, image, totals[0], 1, 1, reverse=reverse)
+    seed._add_path(cost[:, ::-1], image[:, ::-1], totals[1][:, ::-1], 1, -1, reverse=reverse)
+    np.testing.assert_array_equal(totals[0], totals[1])
+    first = 4 if reverse else 0
+    np.testing.assert_array_equal(totals[0][first], cost[first])
+
+
 def test_the_coarse_sweep_finds_relief_to_a_few_centimetres():
     frame = small_frame()
     coarse, factor = seed.coarse_relief(frame)

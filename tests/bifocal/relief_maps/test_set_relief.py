@@ -196,6 +196,8 @@ def test_what_stands_in_front_is_shown_where_it_fits_nearly_as_well():
         found = decided(*misfits)
         assert (found.r == np.float32(right)).all()
         assert (found.quality == quality).all()
+        # What is seen to differ is decided: the sigma is that of the one that is taken.
+        np.testing.assert_allclose(found.sigma, 0.002, rtol=1e-5)
 
 
 def test_what_photos_show_best_is_shown_though_no_pair_measured_it():

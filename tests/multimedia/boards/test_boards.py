@@ -24,6 +24,7 @@ from multimedia import (
     project,
     read_project,
 )
+from multimedia.boards import workflow as boards_workflow
 from multimedia.boards.board_points import PosedView, with_boards
 from multimedia.orientation.plate_poses import plate_pose
 from multimedia.projects.photos import read_photo
@@ -224,9 +225,16 @@ def test_markers_that_lie_otherwise_than_on_the_board_are_named(tmp_path, monkey
     result = CliRunner().invoke(main, ["boards", "housing.toml", "b0.png", *words, "7x4"])
     assert result.exit_code == 1
     assert "b0.png: shows 12 markers of 4X4_250, 0 to 11, but not as they lie" in result.stderr
-    three = ["b0.png", "b1.png", "b2.png"]
+    three, known = ["b0.png", "b1.png", "b2.png"], []
+    monkeypatch.setattr(
+        boards_workflow, "with_boards",
+        lambda *given, numbered, **more: [
+            known.append(numbered), with_boards(*given, numbered=numbered, **more)
+        ][1],
+    )  # fmt: skip
     result = CliRunner().invoke(main, ["boards", "housing.toml", *three, *words, "6x4"])
     assert "3 photos show ChArUco 4X4_250" in result.output
+    assert known == [True]  # each of its points tells which it is
 
 
 SENSOR = Sensor(width=1280, height=1024, pixel_size=np.array([0.006, 0.006]))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import openpyxl
 import pytest
+from openpyxl.workbook.defined_name import DefinedName
 
 from bifocal import InputError
 from photocore.tables import Column, read_table
@@ -473,3 +474,26 @@ def test_a_sheet_added_under_another_title_prints_its_own_headings(tmp_path):
         book = file.read("xl/workbook.xml").decode()
     names = re.findall(r"<definedName [^>]*localSheetId=\"1\"[^>]*>([^<]*)<", book)
     assert sorted(names) == ["'Dose''s 2'!$4:$5", "'Dose''s 2'!$A$1:$C$9"]
+
+
+def test_names_of_a_sheet_added_under_another_title_lead_to_it_and_those_of_others_stay(tmp_path):
+    """The user's own sheet has the title; "own" led to it before, "more" leads elsewhere."""
+    made, user = openpyxl.Workbook(), openpyxl.Workbook()
+    user.create_sheet("Else")
+    for book in (made, user):
+        book.worksheets[0].title = "Dose"
+    for book, names in (
+        (made, {"own": "'Dose'!$B$2", "more": "'Dose'!$B$3", "new": "'Dose'!$B$4"}),
+        (user, {"own": "'Dose'!$A$1", "more": "'Else'!$C$3"}),
+    ):
+        for name, place in names.items():
+            book.defined_names[name] = DefinedName(name, attr_text=place)
+    made.save(package := io.BytesIO())
+    user.save(tmp_path / "own.xlsx")
+    editor = WorkbookEditor(tmp_path / "own.xlsx")
+    editor.add_sheets(finished_parts(package, results={}), {"Dose": "Dose 2"})
+    editor.save(tmp_path / "out.xlsx", overwrite=False)
+    names = openpyxl.load_workbook(tmp_path / "out.xlsx").defined_names
+    assert {name: names[name].attr_text for name in ("own", "more", "new")} == {
+        "own": "'Dose 2'!$B$2", "more": "'Else'!$C$3", "new": "'Dose 2'!$B$4",
+    }  # fmt: skip
