@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bifocal import Control
+from bifocal import Control, Interior
+from bifocal.model.interior_orientation import with_one_lens
 from bifocal.orientation.adjustment.pair_adjustment import as_one
 from bifocal.orientation.orientation_remarks import control_remarks
 from bifocal.remarks import remark
@@ -36,3 +37,17 @@ def test_control_is_asked_for_up_to_four_points_and_advised_up_to_nine(count, ke
     )
     words = [remark(f"orientation.{key}", count=count)] if key else []
     assert control_remarks(some, pair) == words
+
+
+def test_one_lens_is_certain_only_where_both_principal_distances_are_known():
+    size = (1536, 1024)
+    measured = Interior.from_focal(1.2 * 1536, image_size=size, sigma=0.02, source="--focal")
+    assumed = Interior.unknown(size)
+    for first, second, known in (
+        (measured, measured, True), (measured, assumed, False), (assumed, measured, False),
+        (assumed, assumed, False),
+    ):  # fmt: skip
+        interiors, certain = with_one_lens((first, second))
+        assert certain == known
+        assert [one.focal for one in interiors] == pytest.approx([1.2 * 1536] * 2)
+        assert all(one.sigma_radial > 0 for one in interiors)

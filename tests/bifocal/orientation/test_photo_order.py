@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from bifocal import Control, GeometryError, Interior, SiteMeasures
 from bifocal.collimation.job_tasks import task_of
 from bifocal.orientation.align_workflow import AlignOptions, KnownLens, align_photos, way_of
 from bifocal.orientation.approximate_orientation import Given, order_of
-from bifocal.orientation.starts.photo_order import first_is_far
+from bifocal.orientation.starts.photo_order import _change, first_is_far
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tuning import ORDER
 from photocore.camera.pinhole import plane_transfer
@@ -167,3 +168,21 @@ def test_a_rendered_church_dropped_in_either_order_lies_back(
     found = made.pair.intersect(rows[:, 6:8], rows[:, 4:6]).xyz[:, 2]
     assert made.pair.image1.file.endswith("d18.png")
     assert np.nanmedian(np.abs(found - rows[:, 3])) < 0.003
+
+
+def test_faint_texture_tells_less_of_what_another_surface_replaces_than_strong_one():
+    """A block of the second photo stands 6 px further right; grey values of plaster and of stone.
+
+    Noise of some grey values is not to count as a surface: the share of plaster is the smaller.
+    """
+    rng, side = np.random.default_rng(3), 300
+    rough = cv2.GaussianBlur(rng.normal(0, 1, (side, side + 40)).astype(np.float32), (0, 0), 2)
+    away = np.zeros((side, side, 2), np.float32)
+    away[..., 0] = 1
+    shares = []
+    for contrast in (3, 30):
+        wall = np.clip(128 + contrast * rough / rough.std(), 0, 255).astype(np.uint8)
+        first, second = wall[:, 20:-20].copy(), wall[:, 20:-20].copy()
+        second[:, 100:200] = wall[:, 114:214]
+        shares.append(_change((first, second), away, np.ones((side, side), bool))[0])
+    assert -2.5 < shares[0] < shares[1] - 0.4 < -1.4
