@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import importlib
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,9 @@ ROOT = Path(__file__).parents[1]
 TEXTS = {path: path.read_text("utf-8") for path in sorted(ROOT.glob("bifocal/**/*.py"))}
 #: Modules with classes of tuned numbers.
 MODULES = [path for path, text in TEXTS.items() if re.search(r"^class \w+Tuning:", text, re.M)]
+
+#: Every tuned number, by module: the values that the evidence beside them was measured with.
+TUNED = (ROOT / "tests/golden/tuned_numbers.txt").read_text("utf-8")
 
 
 def name_of(path: Path) -> str:
@@ -71,3 +75,12 @@ def test_no_tuned_number_can_be_changed_on_the_way(path):
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_every_tuned_number_is_used(path):
     assert uses(path) == numbers(path)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_a_tuned_number_is_the_one_that_its_evidence_was_measured_with(path):
+    """One that is changed wants its evidence measured anew, then its line among the golden ones."""
+    module = importlib.import_module(name_of(path))
+    lines = [f"{number} = {attrgetter(number)(module)!r}" for number in sorted(numbers(path))]
+    block = "\n".join([f"[{name_of(path)}]", *lines]) + "\n"
+    assert f"\n{block}\n" in f"\n{TUNED}\n", block
