@@ -27,14 +27,18 @@ from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
 from bifocal.collimation.starting import open_sample, open_wall, recent, reopen, walls_at_hand
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
-from bifocal.collimation.workbook.profile_book import profile_book
+from bifocal.collimation.workbook.profile_book import profile_book, profile_csv
 from bifocal.faces.faces_files import beside
 from photocore.arrays import FloatArray, as_points
 from photocore.jsonfile import plain
 from photocore.output import relative_name
 
 _FRESH = {"cache-control": "no-store"}
-_BOOK = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+#: What writes a profile, and what kind of file that is, by its ending.
+_PROFILES = {
+    "csv": (profile_csv, "text/csv"),
+    "xlsx": (profile_book, "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"),
+}
 
 
 async def _photos(request: Request) -> Response:
@@ -223,7 +227,7 @@ async def _profile(request: Request) -> Response:
     return answer(await in_thread(session_of(request).products.profile, start, end))
 
 
-async def _profile_book(request: Request) -> Response:
+async def _profile_file(request: Request) -> Response:
     query = dict(request.query_params)
     ends = [number_of(query, key) for key in ("x0", "y0", "x1", "y1")]
     if None in ends:
@@ -231,12 +235,16 @@ async def _profile_book(request: Request) -> Response:
     start, end = np.array(ends, dtype=float).reshape(2, 2)
     session = session_of(request)
 
-    def book() -> bytes:
-        title = session.files.stem
-        return profile_book(session.products.profile(start, end), start, end, title)
+    ending = request.path_params["ending"]
+    if ending not in _PROFILES:
+        raise HTTPException(404, "there is no such page.")
+    write, kind = _PROFILES[ending]
 
-    headers = _attachment(f"{session.files.stem}_profile.xlsx")
-    return Response(await in_thread(book), media_type=_BOOK, headers=headers)
+    def written() -> bytes:
+        return write(session.products.profile(start, end), start, end, session.files.stem)
+
+    headers = _attachment(f"{session.files.stem}_profile.{ending}")
+    return Response(await in_thread(written), media_type=kind, headers=headers)
 
 
 def _place(body: dict[str, Any], key: str) -> FloatArray:
@@ -277,7 +285,7 @@ ROUTES = [
     Route("/relief/value", _value),
     Route("/relief/met", _met, methods=["POST"]),
     Route("/relief/profile", _profile, methods=["POST"]),
-    Route("/relief/profile.xlsx", _profile_book),
+    Route("/relief/profile.{ending}", _profile_file),
     Route("/uncertainty.png", _uncertainty),
     Route("/uncertainty.json", _contours),
 ]

@@ -1,4 +1,4 @@
-"""A profile of the relief as a workbook: its places, their relief, and a chart of them."""
+"""A profile of the relief as a table and as a workbook: its places, their relief, a chart."""
 
 from __future__ import annotations
 
@@ -22,6 +22,27 @@ HEADINGS = ("distance [m]", "X [m]", "Y [m]", "r [m]", "sigma_r [m]")
 _LINE = 12_700
 
 
+def profile_rows(
+    profile: Mapping[str, Sequence[float | None]], start: FloatArray, end: FloatArray
+) -> list[tuple[float | None, ...]]:
+    """Return the rows below `HEADINGS`; as `profile_book`. [m]"""
+    distances = np.array(profile["distance"], dtype=float)
+    places = start + distances[:, None] / (distances[-1] or 1.0) * (end - start)
+    columns = (distances.tolist(), *places.T.tolist(), profile["r"], profile["sigma"])
+    return list(zip(*columns, strict=True))
+
+
+def profile_csv(
+    profile: Mapping[str, Sequence[float | None]], start: FloatArray, end: FloatArray, _: str
+) -> bytes:
+    """Return the same as a table; as `profile_book`."""
+    lines = (
+        ",".join("" if value is None else f"{value:.4f}" for value in row)
+        for row in profile_rows(profile, start, end)
+    )
+    return "\r\n".join((",".join(HEADINGS), *lines, "")).encode()
+
+
 def profile_book(
     profile: Mapping[str, Sequence[float | None]], start: FloatArray, end: FloatArray, title: str
 ) -> bytes:
@@ -40,16 +61,14 @@ def profile_book(
     sheet = book.active
     sheet.title = "Profile"
     sheet.append(HEADINGS)
-    distances = np.array(profile["distance"], dtype=float)
-    places = start + distances[:, None] / (distances[-1] or 1.0) * (end - start)
-    rows = zip(distances.tolist(), *places.T.tolist(), profile["r"], profile["sigma"], strict=True)
+    rows = profile_rows(profile, start, end)
     for row in rows:
         sheet.append([plain_cell(sheet, value) for value in row])
     for cells in sheet.iter_cols():
         sheet.column_dimensions[cells[0].column_letter].width = 14
         for cell in cells[1:]:
             cell.number_format = "0.0000"
-    sheet.freeze_panes, last = "A2", len(distances) + 1
+    sheet.freeze_panes, last = "A2", len(rows) + 1
     x, r = (Reference(sheet, min_col=column, min_row=2, max_row=last) for column in (1, 4))
     chart = scatter(title, HEADINGS[0], HEADINGS[3], x, {HEADINGS[3]: r})
     line = chart.series[0]

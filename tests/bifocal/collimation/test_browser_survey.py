@@ -20,15 +20,23 @@ PICKS = [((300.0, 330.0), (293.0, 325.0)), ((1190.0, 700.0), (1196.0, 703.0))]
 #: Note what is written on each canvas since it was cleared: text, left, right, base. [px]
 TEXTS = """() => {
   window.written = new Map();
-  const { fillText, clearRect } = CanvasRenderingContext2D.prototype;
+  const lettered = new Map();
+  const { fillText, clearRect, drawImage } = CanvasRenderingContext2D.prototype;
   CanvasRenderingContext2D.prototype.clearRect = function (...area) {
     written.set(this.canvas, []);
     return clearRect.apply(this, area);
   };
   CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
-    written.get(this.canvas)?.push([text, x, x + this.measureText(text).width, y]);
+    lettered.set(this.canvas, [text, x, x + this.measureText(text).width, y]);
     return fillText.call(this, text, x, y);
   };
+  CanvasRenderingContext2D.prototype.drawImage = function (image, x, y, ...size) {
+    const [text, left, right, base] = lettered.get(image) ?? [];
+    if (text) written.get(this.canvas)?.push([text, x + left, x + right, y + base]);
+    return drawImage.call(this, image, x, y, ...size);
+  };
+  // Texts are lettered once, and anew in a window of another size.
+  window.dispatchEvent(new Event("resize"));
 }"""
 
 

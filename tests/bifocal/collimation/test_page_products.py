@@ -277,8 +277,7 @@ def test_relief_is_read_on_the_page(tmp_path) -> None:
         # r rises by 1 m over 4 m from X = -2.
         assert client.get("/relief/value?X=0.05&Y=0").json()["r"] == pytest.approx(0.5125, abs=1e-6)
         assert client.get("/relief/value?X=0&Y=1").json() == {"r": None, "sigma": None}
-        ask = {"from": [-1, 0], "to": [1, 0]}
-        profile = client.post("/relief/profile", json=ask).json()
+        profile = client.post("/relief/profile", json={"from": [-1, 0], "to": [1, 0]}).json()
         assert profile["distance"][-1] == pytest.approx(2.0)
         slope = np.diff(profile["r"]) / np.diff(profile["distance"])
         np.testing.assert_allclose(slope, 0.25, atol=1e-5)
@@ -290,7 +289,8 @@ def test_relief_is_read_on_the_page(tmp_path) -> None:
         np.testing.assert_allclose(column, np.array(profile["r"], dtype=float), rtol=1e-12)
         assert np.isnan(column).any()
         assert rows[-1][:3] == pytest.approx((profile["distance"][-1], 1, 0.95))
-        assert client.get("/relief/profile.xlsx?x0=-1&y0=0").status_code == 400
+        addresses = ("profile.txt?x0=0&y0=0&x1=1&y1=1", "profile.xlsx?x0=-1&y0=0")
+        assert [client.get(f"/relief/{name}").status_code for name in addresses] == [404, 400]
         assert client.get("/relief/overlay.png").content[:4] == b"\x89PNG"
         assert client.get("/uncertainty.png").content[:4] == b"\x89PNG"
         facts = client.get("/api/state").json()["products"]["relief"]

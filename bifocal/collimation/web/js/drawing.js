@@ -195,7 +195,7 @@ export function beside(context, name, [x, y], gap, style = "#ffffff", needed = f
   const height = 14 * unit;
   const room = context.canvas.width / window.devicePixelRatio;
   const sides = [[gap, -8], [gap, 17], [-gap, -8], [-gap, 17]].map(([dx, dy]) =>
-    [x + dx * unit - (dx < 0 ? width : 0), y + dy * unit]).filter(([left]) => left >= 0 && left + width <= room);
+    [x + dx * unit - (dx < 0 ? width : 0), y + dy * unit].map(Math.round)).filter(([left]) => left >= 0 && left + width <= room);
   const free = sides.find(([left, base]) => [-1, 0, 1].every((near) =>
     (context.texts.get(Math.round(base / height) + near) ?? []).every(([from, to, at]) =>
       to < left || from > left + width || Math.abs(at - base) >= height))) ?? (needed && sides[0]);

@@ -35,21 +35,6 @@ export class Profile {
     this.app.say(t("profile.kept", { count: this.kept.length }));
   }
 
-  /** The profile as a table, in metres. */
-  #save() {
-    const { distance, r, sigma } = this.data;
-    const [[x0, y0], [x1, y1]] = this.ends;
-    const rows = distance.map((along, index) => {
-      const share = along / this.length;
-      return [along, x0 + share * (x1 - x0), y0 + share * (y1 - y0), r[index], sigma[index]]
-        .map((value) => (Number.isFinite(value) ? value.toFixed(4) : "")).join(",");
-    });
-    const file = new Blob([["distance [m],X [m],Y [m],r [m],sigma_r [m]", ...rows, ""].join("\r\n")], { type: "text/csv" });
-    const link = h("a", { href: URL.createObjectURL(file), download: `${this.app.state.title}_profile.csv` });
-    link.click();
-    URL.revokeObjectURL(link.href);
-  }
-
   begin() {
     this.ends = [];
     this.drawing = true;
@@ -133,8 +118,8 @@ export class Profile {
     const [[x0, y0], [x1, y1]] = this.ends;
     render(html`<div class="row"><p class="hint" role="status">${this.words}</p><button type="button" class="quiet" data-testid="profile-keep"
         aria-pressed=${this.kept.includes(this.#corners)} @click=${() => this.#keep()}>${t("profile.keep")}</button>
-        <button type="button" class="quiet" data-testid="profile-csv" @click=${() => this.#save()}>CSV</button>
-        <a class="button quiet" download data-testid="profile-xlsx" href="relief/profile.xlsx?${new URLSearchParams({ x0, y0, x1, y1 })}">Excel</a>
+        ${Object.entries({ csv: "CSV", xlsx: "Excel" }).map(([ending, name]) => html`<a class="button quiet" download data-testid="profile-${ending}"
+          href="relief/profile.${ending}?${new URLSearchParams({ x0, y0, x1, y1 })}">${name}</a>`)}
         <button type="button" class="quiet" @click=${() => this.close()}>${t("profile.close")}</button></div>
       <svg viewBox="0 0 ${WIDTH} ${HEIGHT}" role="img" class="chart" aria-label=${alt} @pointermove=${(event) => this.#point(event)}
         @pointerleave=${() => { this.at = null; this.paint(); }}>${drawn}</svg>`, this.element);
