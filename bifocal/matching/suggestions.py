@@ -137,7 +137,7 @@ def suggest(
     low, high = relief_range or (SUGGESTIONS.farthest * pair.d2, SUGGESTIONS.nearest * pair.d2)
     reliefs = _reliefs(pair, image, pixel, (low, high), partner.shape)
     predicted = seen_in_other(pair, image, pixel, reliefs)
-    search = _Search.along(pair, (picture, partner), image, pixel, reliefs, predicted)
+    search = _LineSearch.along(pair, (picture, partner), image, pixel, reliefs, predicted)
     correlation, *halves = search.correlation()
     if not np.isfinite(correlation).any():
         raise InputError("too near to the rim of a photo for a suggestion; pick it by hand.")
@@ -174,7 +174,7 @@ class _LineMatch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Search:
+class _LineSearch:
     """Places on the line of a pick, and both photos around them, equally sharp."""
 
     pair: Pair
@@ -191,7 +191,7 @@ class _Search:
     def along(
         cls, pair: Pair, images: tuple[ByteArray, ByteArray], image: int, pixel: FloatArray,
         reliefs: FloatArray, there: FloatArray,
-    ) -> _Search:  # fmt: skip
+    ) -> _LineSearch:  # fmt: skip
         """Return the search among places of these reliefs."""
         local = _zooms(pair, image, np.broadcast_to(pixel, there.shape), there, reliefs)
         scale = float(np.median(np.sqrt(np.abs(np.linalg.det(local)))))
@@ -223,7 +223,7 @@ class _Search:
         return _LineMatch(pixel, float(result.zncc[0]), sigma, misfit, fits)
 
 
-def _others(search: _Search, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:
+def _others(search: _LineSearch, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:
     """Return other places that whole or half windows take for as good as the match, best first."""
     offers, places = list[tuple[float, FloatArray]](), [pixel]
     for curve in curves:

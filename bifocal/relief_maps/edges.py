@@ -117,7 +117,7 @@ def sharpen(
     band = ~swept & (parallax > max(EDGES.least_step, EDGES.noise_steps * typical))
     result = relief.copy()
     far, near = _features(frame.image1), _features(frame.image2)
-    guide = _Guide(far[..., 0])
+    guide = _GuidedFilter(far[..., 0])
     precise = precision(typical)
     limits = precise * np.array(EDGES.limits) + (1 - precise) * np.array(EDGES.imprecise_limits)
     grey, gradient = limits.tolist()
@@ -206,7 +206,7 @@ def _mismatch(
     return total
 
 
-class _Guide:
+class _GuidedFilter:
     """Guided filter: averages within a window, but not across edges of the guiding image."""
 
     def __init__(self, image: Float32Array) -> None:

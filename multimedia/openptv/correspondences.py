@@ -187,7 +187,7 @@ class _Exposure:
         count = len(self.cameras)
         maps = [TargetMap(t[f], tolerance) if len(f) else None
                 for t, f in zip(self.targets, free, strict=True)]  # fmt: skip
-        search = _Search(self, free, maps, tolerance, agree)
+        search = _TargetSearch(self, free, maps, tolerance, agree)
         few = proposing_pairs(count, agree)
         proposals = [np.empty((0, count), dtype=np.int64)]
         proposals += [search.proposals(a, b, free[a], free[b]) for a, b in few]
@@ -219,7 +219,7 @@ class _Exposure:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Search:
+class _TargetSearch:
     """Targets that are free, and how they are sought."""
 
     frame: _Exposure
