@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
 from bifocal.campaigns.pair_steps import PairJob
@@ -57,9 +56,10 @@ def found_anywhere(job: PairJob) -> PairJob:
 def _moved(job: PairJob, place: Callable[[Path], Path]) -> PairJob:
     """Return a job with its files and folders elsewhere."""
     files = {role: place(path) for role, path in job.files.items()}
-    paths: dict[str, Any] = {name: place(getattr(job, name)) for name in ("folder", "far", "near")}
-    paths["more"] = tuple(map(place, job.more))
-    return replace(job, files=files, joint=job.joint and place(job.joint), **paths)
+    return replace(
+        job, folder=place(job.folder), far=place(job.far), near=place(job.near),
+        more=tuple(map(place, job.more)), files=files, joint=job.joint and place(job.joint),
+    )  # fmt: skip
 
 
 def packed(job: PairJob) -> Parcel:

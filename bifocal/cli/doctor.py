@@ -39,9 +39,9 @@ def command(options: DoctorCommand) -> None:
         report = diagnosis()
         print_result(report, diagnosis_lines(report), as_json=options.as_json)
         return
-    report = examine(options.book, office())
-    print_result(report, examination_lines(report, office()), as_json=options.as_json)
-    if report["faults"] or report["differ"]:
+    book = examine(options.book, office())
+    print_result(book, examination_lines(book, office()), as_json=options.as_json)
+    if book["faults"] or book["differ"]:
         raise InputError(f"{options.book}: not as a spreadsheet program would leave it; {_MENDED}")
 
 

@@ -59,11 +59,8 @@ def command(source: Path, out: Path, overwrite: bool, **options: Any) -> None:
     from bifocal.reports.workflow import ReportTask, report_of
 
     project = {name: value for name in PROJECT if (value := options.pop(name)) is not None}
-    paths: dict[str, Any] = {
-        "unit": options.pop("unit") or "",
-        "language": options.pop("language") or "",
-    }
-    task = ReportTask(**options, **paths, project=project)
+    unit, language = options.pop("unit") or "", options.pop("language") or ""
+    task = ReportTask(**options, unit=unit, language=language, project=project)
     with progress_bar("report") as progress:
         for text in report_of(source, out, task, overwrite=overwrite, progress=progress):
             remark(text)

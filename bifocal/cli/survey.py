@@ -101,9 +101,11 @@ def command(
         return
     if machines["ship"] and not machines["scheduler"]:
         raise click.UsageError("--ship goes with --scheduler.")
-    settings: dict[str, Any] = {"machines": Machines(**machines), "mosaic": mosaic_wanted(survey)}
     with progress_bar("survey", quiet=as_json) as progress:
-        result = run_survey(pairs, progress=progress, tell=remark, **settings)
+        result = run_survey(
+            pairs, progress=progress, tell=remark, machines=Machines(**machines),
+            mosaic=mosaic_wanted(survey),
+        )  # fmt: skip
     result = result.in_words(in_survey_words)
     print_result(result.to_dict(), result.lines(), as_json=as_json)
     if result.failed:

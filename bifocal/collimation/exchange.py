@@ -129,12 +129,12 @@ def _is_swap(change: Change) -> bool:
     return (change.kind, change.key) == ("orientation", ASIDE)
 
 
-def _proposal_now(session: SurveyOnPage) -> dict[str, Any]:
+def _proposal_now(session: SurveyOnPage) -> dict[str, ProposalAside]:
     """Return the orientation that waits to be accepted, with the digest of its file."""
-    path = session.proposed_path
-    if path is None:
+    path, proposal = session.proposed_path, session.proposal
+    if path is None or proposal is None:
         return {}
-    return {"proposal": {**(session.proposal or {}), "sha256": known_hash(path)}}
+    return {"proposal": ProposalAside(**proposal, sha256=known_hash(path))}
 
 
 def follow_exchange(session: SurveyOnPage, changes: list[Change]) -> None:

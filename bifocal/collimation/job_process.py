@@ -55,8 +55,11 @@ from photocore.jsonfile import plain
 from photocore.options import options_of
 from photocore.remarks import with_keys
 from photocore.tables import write_csv
+from photocore.tables.csvwrite import Columns
 
+#: What a job is told and what it answers: what JSON holds, by the keys of its kind.
 Task = Mapping[str, Any]
+Result = dict[str, Any]
 #: Progress is told at most so often. [s]
 _OFTEN = 0.2
 #: Points of a pair that hold the frame where further photos join it.
@@ -94,7 +97,7 @@ def main() -> int:
     return 0
 
 
-def _align(task: Task, progress: Progress) -> dict[str, Any]:
+def _align(task: Task, progress: Progress) -> Result:
     site = SiteMeasures(**task["site"])
     lenses = [KnownLens(**lens) for lens in task["lenses"]]
     progress(0.0, 1.0)
@@ -123,7 +126,7 @@ def _align(task: Task, progress: Progress) -> dict[str, Any]:
     }
 
 
-def _join(task: Task, progress: Progress) -> dict[str, Any]:
+def _join(task: Task, progress: Progress) -> Result:
     """Adjust a pair and further photos of its wall together.
 
     Without control points, points that the pair gives hold the frame, as precisely as it gives
@@ -151,7 +154,7 @@ def _join(task: Task, progress: Progress) -> dict[str, Any]:
     lenses = {photo.extra.get("lens") for photo in alignment.photos.photos} - {None}
     # Of points that the program chose nobody can mend the picks.
     of_control = alignment.remarks if task["control"] else ()
-    return {"remarks": [*alignment.words, *of_control], "lenses": sorted(lenses)}
+    return {"remarks": [*alignment.words, *of_control], "lenses": sorted(map(str, lenses))}
 
 
 def _frame(pair: Pair, table: Path, photos: int) -> float:
@@ -160,9 +163,7 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
     solved = pair.intersect(matches.pixels1, matches.pixels2)
     sigma = np.sqrt(np.trace(solved.covariance, axis1=1, axis2=2) / 3)
     good = np.array([flag in ("OK", "ON-PLANE") for flag in solved.flags]) & (sigma > 0)
-    columns: dict[str, Any] = {
-        "id": [name for name, keep in zip(matches.ids, good, strict=True) if keep]
-    }
+    columns: Columns = {"id": [name for name, keep in zip(matches.ids, good, strict=True) if keep]}
     columns |= dict(zip(("X [m]", "Y [m]", "r [m]"), solved.xyz[good].T, strict=True))
     blank = np.full(int(good.sum()), np.nan)
     pixels = [*matches.pixels1[good].T, *matches.pixels2[good].T, *[blank] * (2 * photos - 4)]
@@ -171,7 +172,7 @@ def _frame(pair: Pair, table: Path, photos: int) -> float:
     return float(np.median(sigma[good])) if good.any() else SiteMeasures().sigma_control
 
 
-def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
+def _rectify(task: Task, progress: Progress) -> Result:
     """Bring one photo alone to scale, with drawings."""
     settings = {name: one.fixed_default for name, one in options_of(RectifyCommand).items()}
     settings |= {"scale": 50.0, **task, "corners": np.ravel(task["corners"])}
@@ -191,7 +192,7 @@ def _rectify(task: Task, progress: Progress) -> dict[str, Any]:
     return {"words": words, "files": done.delivery.files, "misfits": misfits}
 
 
-def _match(task: Task, progress: Progress) -> dict[str, Any]:
+def _match(task: Task, progress: Progress) -> Result:
     progress(0.0, 1.0)
     settings = MatchSettings(count=task["count"], features=task["features"])
     _, matches = match_pair_file(read_pair(task["pair"]), settings)
@@ -211,7 +212,7 @@ def _match(task: Task, progress: Progress) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _targets(task: Task, progress: Progress) -> dict[str, Any]:
+def _targets(task: Task, progress: Progress) -> Result:
     """Return the targets that both photos show."""
     try:
         matches = _match({**task, "count": 5000, "features": False}, progress)
@@ -220,7 +221,7 @@ def _targets(task: Task, progress: Progress) -> dict[str, Any]:
     return {"points": [one for one in matches["points"] if one["code"] != "feature"]}
 
 
-def _relief(task: Task, progress: Progress) -> dict[str, Any]:
+def _relief(task: Task, progress: Progress) -> Result:
     job = ReliefJob(
         out=Path(task["out"]), overwrite=task["overwrite"], faces=faces_path(None, task["pair"]),
         **task["options"],
@@ -240,7 +241,7 @@ def _ortho_task(task: Task) -> OrthoTask:
     )  # fmt: skip
 
 
-def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
+def _ortho(task: Task, progress: Progress) -> Result:
     result = make_ortho(
         _source(task), Path(task["out"]), _ortho_task(task), overwrite=task["overwrite"],
         progress=progress,
@@ -248,7 +249,7 @@ def _ortho(task: Task, progress: Progress) -> dict[str, Any]:
     return {"remarks": result.remarks}
 
 
-def _deliver(task: Task, progress: Progress) -> dict[str, Any]:
+def _deliver(task: Task, progress: Progress) -> Result:
     """Make drawings, report and 3-D view; relief and orthophoto first where they are lacking."""
     path, out = Path(task["pair"]), Path(task["out"])
     if task["mark"] and not Path(task["mark"]).is_file():  # it could not be written
@@ -304,7 +305,7 @@ def _lengths(task: Task) -> dict[str, LengthCheck]:
     return {name: LengthCheck(**check) for name, check in task.get("lengths", {}).items()}
 
 
-def _suggest(task: Task, progress: Progress) -> dict[str, Any]:
+def _suggest(task: Task, progress: Progress) -> Result:
     """Return the faces that the program would draw."""
     progress(0.0, 1.0)
     pair = read_pair(task["pair"])
@@ -332,7 +333,7 @@ def _path(name: str | None) -> Path | None:
     return Path(name) if name else None
 
 
-_WORKS: dict[str, Callable[[Task, Progress], dict[str, Any]]] = {
+_WORKS: dict[str, Callable[[Task, Progress], Result]] = {
     "align": _align,
     "join": _join,
     "rectify": _rectify,

@@ -29,6 +29,7 @@ from photocore.errors import InputError
 from photocore.jsonfile import plain
 from photocore.output import free_path
 from photocore.tables import write_csv
+from photocore.tables.csvwrite import Columns
 
 KINDS = ("align", "join", "match", "targets", "relief", "ortho", "deliver", "suggest", "rectify")
 Options = Mapping[str, Any]
@@ -182,7 +183,7 @@ def _deliver_options(session: Session, options: Options, pair: Options) -> dict[
     }
 
 
-def _align_task(session: Session, options: Options) -> dict[str, Any]:
+def _align_task(session: Session, options: Options) -> dict[str, object]:
     infos, state = session.pictures.infos, session.state
     if len(infos) != 2:
         raise InputError(remark("page.give_photos"))
@@ -211,7 +212,7 @@ def _align_task(session: Session, options: Options) -> dict[str, Any]:
     }
 
 
-def _join_task(session: Session) -> dict[str, Any]:
+def _join_task(session: Session) -> dict[str, object]:
     """Return what is told of an accepted pair, so that further photos are adjusted with it."""
     products, photos = session.products, session.pictures
     pair = photos.needed_pair()
@@ -288,7 +289,7 @@ def _through_media(session: Session, way: str, given: list[float | None]) -> str
 def _write_control(session: Session, control: Control, photos: int = 2) -> dict[str, Path | None]:
     """Write the control points and tapes as the tables that `bifocal align` reads."""
     tables: dict[str, Path | None] = {"control": None, "lengths": None}
-    columns: dict[str, Any] = {"id": list(control.ids)}
+    columns: Columns = {"id": list(control.ids)}
     measured = np.where(control.sigma[:, 2:] > control.sigma[:, :1], np.nan, control.xyz[:, 2:])
     xyz = np.hstack([control.xyz[:, :2], measured])
     for key, values in zip(("X [m]", "Y [m]", "r [m]"), xyz.T, strict=True):
@@ -323,8 +324,8 @@ def _write_outlines(session: Session, folder: Path) -> list[str]:
         drawn = {} if pair is None else outlines_of(session.state, pair)
     if not drawn:
         return []
-    columns: dict[str, Any] = {
-        "id": list(drawn), "layer": [one["layer"] for one in drawn.values()],
+    columns: Columns = {
+        "id": list(drawn), "layer": [str(one["layer"]) for one in drawn.values()],
     }  # fmt: skip
     units = {"width": "m", "height": "m", "area": "m2", "length": "m", "relief": "m"}
     for key, unit in units.items():

@@ -244,7 +244,7 @@ class SurveyState:
         """Put changes into effect."""
         for change in changes:
             if change.kind == "settings":
-                for name, value in cast("dict[str, Any]", change.after).items():
+                for name, value in cast("dict[str, object]", change.after).items():
                     setattr(self, name, value)
                 continue
             records: dict[str, object] = getattr(self, change.kind)

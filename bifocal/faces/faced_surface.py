@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -164,7 +164,7 @@ def faced(relief: _Map, faces: Faces | None) -> tuple[_Map, FacedSurface | None]
         only = np.where(relief.quality == Quality.MEASURED, relief.r, np.float32(np.nan))
         measured = MapSurface.of_array(only, grid)
     surface = FacedSurface(map_surface, faces, measured)
-    r, sigma, quality = (np.array(band) for band in (relief.r, relief.sigma, relief.quality))
+    r, sigma, quality = np.array(relief.r), np.array(relief.sigma), np.array(relief.quality)
     for column, row, part in grid.tiles(EDGES.tile):
         cut = np.s_[row : row + part.height, column : column + part.width]
         before, label = relief.r[cut], surface.labels(part)
@@ -178,8 +178,7 @@ def faced(relief: _Map, faces: Faces | None) -> tuple[_Map, FacedSurface | None]
             quality[cut][mask] = Quality.DRAWN
         unknown = np.isnan(after)
         sigma[cut][unknown], quality[cut][unknown] = np.nan, Quality.UNKNOWN
-    changes: dict[str, Any] = {"r": r, "sigma": sigma, "quality": quality}
-    return replace(relief, **changes), surface
+    return replace(relief, r=r, sigma=sigma, quality=quality), surface
 
 
 def _noise(sigma: Float32Array) -> float:

@@ -265,13 +265,15 @@ def _corners(rows: Any, least: int) -> FloatArray:
     return corners
 
 
-def _number(properties: Mapping[str, Any], key: str) -> float | None:
+def _number(properties: Mapping[str, object], key: str) -> float | None:
     value = properties.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not abs(float(value)) <= LARGEST:
+    if not isinstance(value, int | float | str) or isinstance(value, bool):
         raise ValueError(key)
-    return float(value)
+    if not abs(number := float(value)) <= LARGEST:
+        raise ValueError(key)
+    return number
 
 
 def _why(error: Exception) -> str:

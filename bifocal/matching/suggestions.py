@@ -223,7 +223,9 @@ class _LineSearch:
         return _LineMatch(pixel, float(result.zncc[0]), sigma, misfit, fits)
 
 
-def _others(search: _LineSearch, curves: list[FloatArray], pixel: FloatArray) -> tuple[FloatArray, ...]:
+def _others(
+    search: _LineSearch, curves: list[FloatArray], pixel: FloatArray
+) -> tuple[FloatArray, ...]:
     """Return other places that whole or half windows take for as good as the match, best first."""
     offers, places = list[tuple[float, FloatArray]](), [pixel]
     for curve in curves:

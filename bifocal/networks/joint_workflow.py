@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from photocore.images import read_grey
 from photocore.jsonfile import write_object
 from photocore.output import atomic_folder, check_all_writable, check_not_input, relative_name
 from photocore.tables import write_csv
+from photocore.tables.csvwrite import Columns
 
 #: Precision of a feature's coordinate. [px of the searched photo]
 SIGMA_FEATURE = 0.5
@@ -219,7 +220,7 @@ def adjust_pairs(
     if out.is_dir():
         check_all_writable(*outputs, overwrite=overwrite)
     result = joint_adjustment(pairs, names, tables, task, progress=progress)
-    table: dict[str, Any] = {"id": []}
+    table: Columns = {"id": []}
     if result.points:
         cells = zip(*(point.values() for point in result.points), strict=True)
         table = dict(zip(result.points[0], map(list, cells), strict=True))

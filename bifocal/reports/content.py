@@ -332,11 +332,9 @@ def _relief(path: Path) -> ReliefMap:
 def _with_photos(pair: Pair, path: Path) -> Pair:
     """Return a workbook's pair with the photo files its pair file names."""
     named = Pair.read(path)
-    images: dict[str, Any] = {
-        f"image{number}": replace(pair.photo(number), file=named.photo(number).file)
-        for number in (1, 2)
-    }
-    return replace(pair, folder=named.folder, **images)
+    first = replace(pair.image1, file=named.image1.file)
+    second = replace(pair.image2, file=named.image2.file)
+    return replace(pair, folder=named.folder, image1=first, image2=second)
 
 
 def _photos(source: Pair | PhotoSet) -> tuple[ReportedPhoto, ...]:

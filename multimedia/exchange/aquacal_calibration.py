@@ -149,7 +149,7 @@ def _surface(project: Project, k: int) -> FlatInterface:
     return media
 
 
-def _kept(data: Mapping[str, Any]) -> dict[str, Any]:
+def _kept(data: Mapping[str, Any]) -> dict[str, dict[str, object]]:
     """Return what of a file the project does not use, without nulls, which TOML lacks."""
     kept = {key: dict(data[key]) for key in _NEEDED if isinstance(data.get(key), Mapping)}
     return {key: {k: v for k, v in part.items() if v is not None} for key, part in kept.items()}

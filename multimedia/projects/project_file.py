@@ -275,7 +275,7 @@ def _graded(section: FileSection) -> dict[str, Any]:
     return {name: section.number(key) for key, name in _GRADED.items() if key in section}
 
 
-def _surfaces(value: Mapping[str, Any], where: str, folder: Path) -> Interfaces:
+def _surfaces(value: Mapping[str, object], where: str, folder: Path) -> Interfaces:
     """Return ray-traced surfaces of any form."""
     section = FileSection(value, where, ("indices", "surfaces", *_GRADED))
     listed = section["surfaces"]
@@ -379,8 +379,8 @@ def _camera(value: Any, number: int) -> tuple[Camera, str, bool]:
     return camera, str(value.get("media", "")), is_posed
 
 
-def _camera_data(camera: Camera, media: str, *, posed: bool) -> dict[str, Any]:
-    data: dict[str, Any] = {"name": camera.name} | ({"media": media} if media else {})
+def _camera_data(camera: Camera, media: str, *, posed: bool) -> dict[str, object]:
+    data: dict[str, object] = {"name": camera.name, **({"media": media} if media else {})}
     if posed:
         data["centre"] = camera.centre.tolist()
         data |= dict(zip(EXTERIOR[3:], np.degrees(camera.angles).tolist(), strict=True))

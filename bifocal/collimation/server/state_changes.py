@@ -30,7 +30,7 @@ class StateEditions:
         # A page outlives its server: the next one's editions must not be taken for these.
         self._server, self._count, self._lock = secrets.token_hex(4), 0, Lock()
 
-    def next(self, state: Mapping[str, Any], held: str | None) -> dict[str, Any]:
+    def next(self, state: Mapping[str, Any], held: str | None) -> dict[str, object]:
         """Return a state as it is sent, with its ``edition`` for who asks for it.
 
         Parameters
@@ -58,8 +58,8 @@ class StateEditions:
                 self._kept.popitem(last=False)
         if before is None:
             return {**state, "edition": edition}
-        values: dict[str, Any] = {}
-        rows: dict[str, Any] = {}
+        values: dict[str, object] = {}
+        rows: dict[str, object] = {}
         for key, value in state.items():
             now, then = words[key], before.get(key)
             if isinstance(now, dict) and isinstance(then, dict):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from bifocal.collimation.background import in_background
 from bifocal.collimation.project import SurveyFiles
@@ -197,12 +197,16 @@ class WorkbookSync:
             same = (written or wanted == self.read.rows) and outlines == self.outlines
             if same and not self._oriented_anew(pair):
                 return
-            more: dict[str, Any] = {"outlines": outlines, "language": survey.spoken}
-            keep = self.seen != self.digest
+            keep, language = self.seen != self.digest, survey.spoken
             if len(points) < LARGE:
-                change_rows(path, self.read, points, pair, pair_path, keep=keep, **more)
+                change_rows(
+                    path, self.read, points, pair, pair_path,
+                    keep=keep, outlines=outlines, language=language,
+                )  # fmt: skip
             else:
-                change_in_process(path, points, pair_path, keep=keep, **more)
+                change_in_process(
+                    path, points, pair_path, keep=keep, outlines=outlines, language=language
+                )
         elif survey.files.pair_is_workbook:
             raise InputError(remark("page.book_gone", name=path.name))
         else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from openpyxl.styles import Alignment
 
@@ -50,9 +49,9 @@ def setup_sheet(builder: BookBuilder, content: SurveyContent) -> None:
             sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
             sheet.worksheet[f"{letter}4"].alignment = Alignment(horizontal="right")
             sheet.worksheet.column_dimensions[letter].width = 18 if letter == "C" else 11
-    media: dict[str, Any] = {"media": content.media_cells, "leaning": content.leaning}
-    listed = groups(is_pair=content.is_pair, lens=content.has_lens, **media)
-    live = formulas(is_pair=content.is_pair, others=content.others, **media)
+    media, leaning, is_pair = content.media_cells, content.leaning, content.is_pair
+    listed = groups(is_pair=is_pair, lens=content.has_lens, media=media, leaning=leaning)
+    live = formulas(is_pair=is_pair, others=content.others, media=media, leaning=leaning)
     row = 5
     for group in listed:
         for name in group:

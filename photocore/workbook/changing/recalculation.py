@@ -6,9 +6,8 @@ import math
 import re
 import subprocess
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from photocore.errors import InputError
 from photocore.workbook.changing.changes import SheetChanges
@@ -30,7 +29,17 @@ _ROWS = 2**20
 _ALIKE = 1e-6
 
 
-def examine(path: Path, program: str | None) -> dict[str, object]:
+class Examination(TypedDict):
+    """What `examine` found."""
+
+    faults: list[str]
+    formulas: int
+    not_calculated: int
+    differ: dict[str, tuple[str, str]]
+    unknown: list[str]
+
+
+def examine(path: Path, program: str | None) -> Examination:
     """Return what is wrong with a workbook; the file stays as it is.
 
     Parameters
@@ -42,7 +51,7 @@ def examine(path: Path, program: str | None) -> dict[str, object]:
 
     Returns
     -------
-    dict
+    Examination
         ``faults`` of the package, ``formulas`` and how many of them were ``not_calculated`` yet,
         ``differ`` (cells that show something else when calculated anew: what is stored and what
         comes out) and ``unknown`` (cells with functions that LibreOffice does not know).
@@ -77,11 +86,12 @@ def examine(path: Path, program: str | None) -> dict[str, object]:
                 blank += 1
             elif not _alike(old, new):
                 differ[f"{title}!{cell}"] = _shown(old), _shown(new)
-    counted = {"formulas": len(cells), "not_calculated": blank}
-    return {"faults": faults, **counted, "differ": differ, "unknown": unknown}
+    return Examination(
+        faults=faults, formulas=len(cells), not_calculated=blank, differ=differ, unknown=unknown
+    )
 
 
-def examination_lines(facts: Mapping[str, Any], program: str | None) -> list[str]:
+def examination_lines(facts: Examination, program: str | None) -> list[str]:
     """Return what `examine` found for people."""
     blank = f", {facts['not_calculated']} without a result yet" if facts["not_calculated"] else ""
     lines = [*facts["faults"], f"{facts['formulas']} formulas{blank}"]
