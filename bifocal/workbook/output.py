@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from bifocal.survey.solved_survey import SolvedSurvey
 from bifocal.survey.tolerances import RULES
 from bifocal.workbook.changing.kinds import check_kind, is_same_kind
 from bifocal.workbook.changing.own_table import add_results
-from bifocal.workbook.changing.update import update_book
+from bifocal.workbook.changing.update import BookUpdate, update_book
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.template_workflow import MOST_ROWS, log_row
@@ -116,15 +117,7 @@ def _is_survey_book(solution: SolvedSurvey) -> bool:
 
 def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overwrite: bool) -> str:
     """Put the results into a survey workbook; return where its old state is kept."""
-    typed = typed_content(solution, content)
-    done = update_book(
-        solution.source,
-        path,
-        solution.survey,
-        typed,
-        options=_options(solution),
-        overwrite=overwrite,
-    )
+    done = _put(update_book, path, solution, content, overwrite=overwrite)
     kept = _kept_as(done.kept)
     if done.added:
         titles = ", ".join(done.added)
@@ -132,14 +125,20 @@ def _update(path: Path, solution: SolvedSurvey, content: SurveyContent, *, overw
     return " ".join([kept, *done.remarks]).strip()
 
 
-def _options(solution: SolvedSurvey) -> dict[str, object]:
-    """Return all that options put in the place of what a workbook says."""
+def _put(
+    into: Callable[..., BookUpdate], path: Path, solution: SolvedSurvey, content: SurveyContent,
+    *, overwrite: bool,
+) -> BookUpdate:  # fmt: skip
+    """Put the results into a workbook, with all that options put in the place of what it says."""
     options = dict(solution.given)
     if solution.rules != RULES:
         options["rules"] = solution.rules
     if solution.adjusted:
         options["adjust_setup"] = True
-    return options
+    return into(
+        solution.source, path, solution.survey, typed_content(solution, content),
+        options=options, overwrite=overwrite,
+    )  # fmt: skip
 
 
 def _add_columns(
@@ -148,15 +147,7 @@ def _add_columns(
     """Put the results beside the user's own table; return where its old state is kept."""
     if solution.source.suffix.lower() not in (".xlsx", ".xlsm"):
         raise InputError(remark("survey.no_macros", of=path))
-    typed = typed_content(solution, content)
-    done = add_results(
-        solution.source,
-        path,
-        solution.survey,
-        typed,
-        options=_options(solution),
-        overwrite=overwrite,
-    )
+    done = _put(add_results, path, solution, content, overwrite=overwrite)
     note = "the results are new columns of your table"
     note = f"{note}; {_kept_as(done.kept)}" if done.kept else f"{note}."
     return " ".join([note, *done.remarks])
