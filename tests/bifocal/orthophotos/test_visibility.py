@@ -59,6 +59,24 @@ def test_tiles_and_the_whole_agree(wall: tuple[Grid, MapSurface, np.ndarray]) ->
     assert (whole ^ tiled).mean() < 2e-4
 
 
+def test_shadows_are_the_same_in_tiles_and_in_mirrors() -> None:
+    """A slanting edge, 0.4 m before the wall, each row of it elsewhere; cameras all round."""
+    grid = Grid.from_bounds((-0.6, -0.6, 0.6, 0.6), gsd=0.01)
+    x, y = np.meshgrid(grid.columns_x, grid.rows_y)
+    relief = np.where(x + 0.7 * y < 0.3, 0.4, 0.0).astype(np.float32)
+    masks = []
+    for across, up in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        mirrored = np.ascontiguousarray(relief[::up, ::across])
+        surface = MapSurface.of_array(mirrored, grid)
+        camera = Foot(np.array([-1.9 * across, -0.9 * up]), 9.0)
+        whole, tiled = (of_tiles(surface, grid, camera, side) for side in (4096, 40))
+        # The strip is some 12 of 120 px broad; cells are laid from each tile's corner.
+        assert 0.05 < whole.mean() < 0.15
+        assert (whole ^ tiled).mean() < 1e-3
+        masks.append(whole[::up, ::across])
+    assert max((one ^ masks[0]).mean() for one in masks) < 1e-3
+
+
 def test_a_step_hides_a_strip_of_the_length_geometry_says() -> None:
     # Step of 0.5 m at x = 2 m, camera 10 m above x = 0: the strip behind is 2 * 0.5 / 9.5 long.
     grid = Grid.from_bounds((1.0, -0.1, 3.0, 0.1), gsd=0.002)
