@@ -80,3 +80,15 @@ def test_the_second_photo_takes_the_colours_of_the_first() -> None:
     assert "matched" in note
     error = matched.image.astype(float) - bright
     assert np.median(np.abs(error)) <= 1.5
+
+
+@pytest.mark.parametrize("gsd", [0.01, 0.02, 0.03])
+def test_colours_of_a_photo_made_smaller_stand_where_those_of_the_whole_do(gsd: float) -> None:
+    """Grey values are 100 times the column plus the row: a mean of pixels is that at its middle."""
+    column, row = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    image = (100 * column + row).astype(np.uint16)
+    source = SourcePhoto.prepare(PHOTO, image, number=1, gsd=gsd)
+    assert source.factor == round(gsd / 0.01)
+    at = np.array([[30.0, 200.5, 400.25]], np.float32), np.array([[40.0, 99.5, 300.0]], np.float32)
+    shown = source.sample(*at, "linear")
+    np.testing.assert_allclose(shown, 100 * at[0] + at[1], atol=5)

@@ -225,3 +225,12 @@ def test_millimetres_from_a_corner_of_the_pictures_are_refused_with_what_to_subt
     aside = [(name, abs(x) + 0.3, abs(y) + 0.2, r) for name, x, y, r in SPREAD]
     answer, said = solved(fill(tmp_path / "u.xlsx", rows(aside)))
     assert by_id(answer)["Q0"]["X"] == pytest.approx(2.3, abs=1e-9)
+
+
+def test_pixels_that_all_lie_at_the_nadir_are_taken_for_millimetres(tmp_path):
+    """Coordinates up to 4, from the nadir: 4 px of 7.4 µm are 0.0296 mm, of 35 mm nothing."""
+    table = [(name, x / 4, y / 4, x / 3, y / 3) for name, x, y in (("A", 4, 3), ("B", -8, 12))]
+    nadirs = {f"nadir_{number}_{side}": 0 for number in (1, 2) for side in ("col", "row")}
+    setup = {**SETUP, **nadirs, "input_unit": "px", "pitch": 0.0074}
+    words = ("within 0.0296 mm of the nadir", "Set the input unit to mm")
+    refused(fill(tmp_path / "s.xlsx", table, setup=setup), *words)
