@@ -115,7 +115,7 @@ def _feature_matches(
     inside = (rest > reliefs[0]) & (rest < reliefs[1])
     predicted = seen_at(pair, pixels1, np.where(inside, rest, 0.0))
     along = directions_at(pair, pixels1, np.where(inside, rest, 0.0))
-    off = (pixels2 - predicted)[:, 0] * -along[:, 1] + (pixels2 - predicted)[:, 1] * along[:, 0]
+    off = ((pixels2 - predicted) * normals_of(along)).sum(axis=1)
     inside &= good.sum() >= MATCH.fewest_matched  # else pair and photos do not belong together
     kept = ~good & inside & (np.abs(off) < MATCH.feature_across * first.reduction)
     on_line = np.where(kept[:, None], predicted, on_line)
@@ -129,8 +129,7 @@ def _feature_matches(
     chosen = chosen[order]
     # With the misfit across the line put back, `solve` can tell honest points from blunders.
     along = directions_at(pair, pixels1, np.nan_to_num(relief))
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    pixels2 = on_line + across * misfit[:, None]
+    pixels2 = on_line + normals_of(along) * misfit[:, None]
     matches = Matches(
         pixels1=pixels1[chosen],
         pixels2=pixels2[chosen],
@@ -324,6 +323,11 @@ def directions_at(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatA
         return rate / np.linalg.norm(rate, axis=1, keepdims=True)
 
 
+def normals_of(along: FloatArray) -> FloatArray:
+    """Return unit vectors turned by a quarter, square to lines along which points move, (n, 2)."""
+    return np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
 def local_zoom(pair: Pair, pixels1: FloatArray, relief: FloatArray) -> FloatArray:
     """Return the derivative of photo 2 by photo 1 under the zoom k(r), shape (n, 2, 2)."""
     factor = zoom_factor(relief, d1=pair.image1.distance, d2=pair.image2.distance)
@@ -375,7 +379,7 @@ def refine_along_lines(
     smooth1, smooth2 = same_scale(*images, local)
     basis = along[:, :, None]
     patches = refine(smooth1, smooth2, pixels1, start, local, basis)
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    across = normals_of(along)
     both = np.stack([along, across], axis=2)
     free = refine(smooth1, smooth2, pixels1, patches.pixels2, local, both, iterations=4)
     misfit = ((free.pixels2 - patches.pixels2) * across).sum(axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal import Matches
+from bifocal.matching.matching import normals_of
 
 
 def test_points_come_back_from_their_table(tmp_path) -> None:
@@ -22,3 +23,8 @@ def test_points_come_back_from_their_table(tmp_path) -> None:
     assert (again.ids, again.kinds) == (points.ids, points.kinds)
     for name in ("pixels1", "pixels2", "sigma", "misfit", "agreement"):
         np.testing.assert_array_equal(getattr(again, name), getattr(points, name))
+
+
+def test_what_lies_square_to_lines_is_a_quarter_turn_from_them() -> None:
+    along = np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])
+    np.testing.assert_array_equal(normals_of(along), [[0.0, 1.0], [-1.0, 0.0], [-0.8, -0.6]])
