@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import re
+
+import numpy as np
 import pytest
+from PIL import Image
 
 from bifocal import InputError
 from photocore.reports.document import Document, Paragraph, TextTable
 from photocore.reports.figure_file import write_figure
-from photocore.reports.html_page import write_html
+from photocore.reports.html_page import _smaller, write_html
 from photocore.reports.writing import write_document
 from tests.full_disk import full_after
 
@@ -53,3 +59,21 @@ def test_words_stand_to_the_left_and_numbers_to_the_right(tmp_path):
     assert '<table class="left1 left2 left5 left6 left8">' in page
     assert ".left8 :is(th,td):nth-child(8){text-align:left}" in page
     assert "white-space:pre-wrap" in page
+
+
+@pytest.mark.parametrize(
+    ("side", "alpha", "kind"), [(200, 255, "jpeg"), (200, 254, "png"), (100, 255, "png")]
+)
+def test_a_large_picture_in_a_figure_becomes_a_jpeg_where_nothing_of_it_is_transparent(
+    side, alpha, kind
+):
+    """Noise of 200 x 200 px is a PNG of 120 kB, of 100 x 100 px one of 30 kB."""
+    noise = np.random.default_rng(1).integers(0, 256, (side, side, 4), dtype=np.uint8)
+    noise[..., 3] = alpha
+    Image.fromarray(noise).save(buffer := io.BytesIO(), "PNG")
+    code = base64.b64encode(buffer.getvalue()).decode("ascii")
+    match = re.fullmatch(r'"data:image/png;base64,([^"]+)"', f'"data:image/png;base64,{code}"')
+    address, _, data = _smaller(match).strip('"').partition(";base64,")
+    assert address == f"data:image/{kind}"
+    with Image.open(io.BytesIO(base64.b64decode(data))) as picture:
+        assert picture.size == (side, side)

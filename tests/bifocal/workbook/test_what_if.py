@@ -88,3 +88,14 @@ def test_the_formulas_recalculated_by_libreoffice_equal_the_library(tmp_path):
 def test_it_is_for_photos_in_air(tmp_path):
     with pytest.raises(InputError, match="what_if"):
         write_template(tmp_path / "no.xlsx", what_if=True, media=3)
+
+
+def test_where_nothing_was_typed_a_tape_and_a_calibration_are_what_is_doubted():
+    """10 mm of either distance, 0.05 mm of either principal distance, and nothing of the pixel."""
+    shown, typed = (
+        what_if(TAKING, changes)[0]
+        for changes in ({}, {"d_1": 0.01, "d_2": 0.01, "c_1": 0.05, "c_2": 0.05, "pitch": 0.0})
+    )
+    assert shown.keys() == typed.keys()
+    for key, values in shown.items():
+        np.testing.assert_array_equal(values, typed[key], err_msg=key)
