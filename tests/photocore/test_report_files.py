@@ -62,13 +62,20 @@ def test_words_stand_to_the_left_and_numbers_to_the_right(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("side", "alpha", "kind"), [(200, 255, "jpeg"), (200, 254, "png"), (100, 255, "png")]
+    ("side", "alpha", "step", "kind"),
+    [(200, 255, 1, "jpeg"), (200, 254, 1, "png"), (100, 255, 1, "png"), (700, 255, 255, "png")],
 )
-def test_a_large_picture_in_a_figure_becomes_a_jpeg_where_nothing_of_it_is_transparent(
-    side, alpha, kind
+def test_a_large_picture_in_a_figure_becomes_a_jpeg_where_that_is_smaller_and_nothing_shines_through(
+    side, alpha, step, kind
 ):
-    """Noise of 200 x 200 px is a PNG of 120 kB, of 100 x 100 px one of 30 kB."""
-    noise = np.random.default_rng(1).integers(0, 256, (side, side, 4), dtype=np.uint8)
+    """Noise of 200 x 200 px is a PNG of 120 kB, of 100 x 100 px one of 30 kB.
+
+    Dots of black and white at random are smaller as a PNG, of 700 x 700 px some 70 kB.
+    """
+    rng = np.random.default_rng(1)
+    noise = rng.integers(0, 255 // step + 1, (side, side, 4), dtype=np.uint8) * np.uint8(step)
+    if step > 1:
+        noise[..., 1:3] = noise[..., :1]
     noise[..., 3] = alpha
     Image.fromarray(noise).save(buffer := io.BytesIO(), "PNG")
     code = base64.b64encode(buffer.getvalue()).decode("ascii")
