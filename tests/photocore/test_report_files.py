@@ -65,7 +65,7 @@ def test_words_stand_to_the_left_and_numbers_to_the_right(tmp_path):
     ("side", "alpha", "step", "kind"),
     [(200, 255, 1, "jpeg"), (200, 254, 1, "png"), (100, 255, 1, "png"), (700, 255, 255, "png")],
 )
-def test_a_large_picture_in_a_figure_becomes_a_jpeg_where_that_is_smaller_and_nothing_shines_through(
+def test_a_large_picture_in_a_figure_becomes_a_jpeg_where_that_is_smaller_and_shows_nothing_else(
     side, alpha, step, kind
 ):
     """Noise of 200 x 200 px is a PNG of 120 kB, of 100 x 100 px one of 30 kB.

@@ -341,8 +341,11 @@ def test_a_calibration_body_of_any_name_is_found(tank_project, tmp_path):
     write_experiment(folder, tank_project)
     (folder / "cal" / "calblock.txt").rename(folder / "cal" / "dots of 2019.txt")
     (folder / "cal" / "a note.txt").write_text("made on a Monday\n")
-    found = read_experiment(folder).project.object_points
-    assert found.xyz == pytest.approx(tank_project.object_points.xyz)
+    with_body = read_experiment(folder).project
+    assert with_body.object_points.xyz == pytest.approx(tank_project.object_points.xyz)
+    (folder / "cal" / "dots of 2019.txt").unlink()
+    for content, missing in ((with_body, False), (read_experiment(folder).project, True)):
+        assert any("no calibration body" in line for line in content.remarks) == missing
 
 
 def test_the_commands_give_openptvs_particle_positions(cavity, tmp_path):

@@ -352,3 +352,9 @@ def test_a_precision_of_image_points_has_their_shape_and_is_positive(sigma) -> N
     assert ImagePoints(**row, sigma=[[np.nan, 0.001]]).sigma.shape == (1, 2)
     with pytest.raises(InputError, match=r"expected shape \(1, 2\) and positive"):
         ImagePoints(**row, sigma=sigma)
+
+
+def test_rows_of_object_points_are_found_by_name_and_those_that_are_none_are_told() -> None:
+    points = ObjectPoints(ids=("a", "b", "c"), xyz=np.eye(3))
+    assert points.rows(["c", "x", "a"]) == [2, -1, 0]
+    assert ObjectPoints().rows(["a"]) == [-1]
