@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +17,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
+    from bifocal.model.diagnostics import Diagnostics
     from bifocal.orientation.alignment import Alignment
 
 
@@ -190,7 +191,7 @@ def _lines(alignment: Alignment) -> Iterator[str]:
         yield f"Assumed: {text}."
 
 
-def _taped(setup: Mapping[str, Any]) -> Iterator[str]:
+def _taped(setup: Diagnostics) -> Iterator[str]:
     """Yield how the lengths that check agree, each in a line."""
     checks = setup.get("length_checks", ())
     if not checks:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from bifocal.collimation.records import GIVES_SCALE, SurveyState
+from bifocal.model.diagnostics import ControlResidual
 from bifocal.model.doubts import RIVALS, doubts_of
 from bifocal.model.pair import Pair
 from bifocal.orientation.control_points import SiteMeasures
@@ -39,15 +40,6 @@ def measure_of(state: SurveyState) -> list[Any] | None:
             sigma = setup.get(f"sigma_d{number}") or SiteMeasures().sigma
             return ["distance", number, distance, sigma]
     return None
-
-
-class ControlResidual(TypedDict, total=False):
-    """How a control point fits: its residuals in both photos, and what was made of them."""
-
-    id: str
-    residual_px: list[float | None]
-    test: float | None
-    used: bool
 
 
 class Report(TypedDict, total=False):

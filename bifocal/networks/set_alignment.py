@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bifocal.model.diagnostics import Diagnostics
 from bifocal.model.image import as_grey
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA, moved
@@ -48,7 +48,7 @@ class SetAlignment:
 
     photos: PhotoSet
     way: str
-    setup: Mapping[str, Any]
+    setup: Diagnostics
     words: tuple[str, ...]
     remarks: tuple[str, ...]
 
@@ -145,7 +145,7 @@ def set_alignment(
     words, remarks = _words(oriented, sigma), _remarks(oriented)
     used = adjusted.observations
     wrong = {b.point: b.test for b in adjusted.blunders if b.where == "control"}
-    setup = {
+    setup: Diagnostics = {
         "way": oriented.way, "sigma0": adjusted.sigma0, "assumed": list(assumed),
         "focal_px": [float(camera.matrix[0, 0]) for camera in cameras],
         "principal_point_px": [camera.matrix[:2, 2] for camera in cameras],

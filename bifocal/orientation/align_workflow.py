@@ -12,6 +12,7 @@ import numpy as np
 from bifocal.files.exif_judge import NOMINAL, judged_focal, middle_aside, sensors_apart
 from bifocal.files.haze import read_greys
 from bifocal.model.basis import rests_on
+from bifocal.model.diagnostics import Diagnostics
 from bifocal.model.interior_orientation import Interior, lens_of_photo
 from bifocal.model.length_checks import check_in_set, disagreement
 from bifocal.model.lens import Lens
@@ -415,8 +416,8 @@ def control_of(
 
 
 def lengths_checked(
-    setup: Mapping[str, Any], photos: PhotoSet, options: AlignOptions, *, photo: int = 1
-) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    setup: Diagnostics, photos: PhotoSet, options: AlignOptions, *, photo: int = 1
+) -> tuple[Diagnostics, tuple[str, ...]]:
     """Return diagnostics with the lengths that check, of a photo by its number, and what is wrong.
 
     Their ends are in that photo, numbered from 1.
@@ -430,7 +431,7 @@ def lengths_checked(
         name: check_in_set(photos, photo - 1, ends, metres, sigma=sigma)
         for name, (ends, metres) in lengths.items()
     }
-    entries = [
+    entries: list[Any] = [
         {"name": name, "photo": photo, "ends": lengths[name][0], **asdict(check),
          "agrees": check.agrees}
         for name, check in checks.items()

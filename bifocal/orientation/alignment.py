@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypedDict
 
 import numpy as np
 
 from bifocal import rays
+from bifocal.model.diagnostics import Diagnostics, WallZone
 from bifocal.model.doubts import MISFITS, doubts_of
 from bifocal.model.homography import apply_homography
 from bifocal.model.interior_orientation import Cameras, Interior
@@ -77,7 +77,7 @@ class Alignment:
     tie1: FloatArray
     tie2: FloatArray
     wall: BoolArray
-    setup: Mapping[str, Any]
+    setup: Diagnostics
     words: tuple[str, ...]
     remarks: tuple[str, ...] = ()
 
@@ -281,11 +281,11 @@ def _diagnostics(
     way: str,
     words: tuple[str, ...],
     sigma_tie: float,
-) -> dict[str, object]:
+) -> Diagnostics:
     """Return the free diagnostics of the pair file."""
     observations, adjusted = oriented.observations, oriented.adjusted
     control = observations.control
-    out: dict[str, object] = {
+    out: Diagnostics = {
         "way": way,
         "standard_deviations": dict(deviations),
         "sigma0": adjusted.sigma0,
@@ -338,15 +338,6 @@ def _diagnostics(
         for (a, b, length), sigma in zip(control.lengths, spreads, strict=True)
     ]
     return out
-
-
-class WallZone(TypedDict):
-    """Relief of a ninth of the far photo: how many points of the wall, median, spread. [mm]"""
-
-    zone: str
-    points: int
-    median: float
-    spread: float
 
 
 def wall_relief(oriented: OrientedPair) -> list[WallZone]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bifocal.model.diagnostics import CommonPoints, TieCells
 from bifocal.model.interior_orientation import Interior
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
@@ -13,7 +14,7 @@ from photocore.arrays import FloatArray
 CELLS = 16
 
 
-def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> dict[str, object]:
+def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> CommonPoints:
     """Return the misfits of the ties used, over all and by cells of either photo.
 
     Returns
@@ -39,7 +40,7 @@ def tie_statistics(observations: PairObservations, adjusted: AdjustedPair) -> di
     }
 
 
-def _cells(pixels: FloatArray, misfit: FloatArray, interior: Interior) -> dict[str, object]:
+def _cells(pixels: FloatArray, misfit: FloatArray, interior: Interior) -> TieCells:
     side = max(interior.image_size) / CELLS
     cells, place = np.unique(np.floor(pixels / side).astype(int), axis=0, return_inverse=True)
     place = place.ravel()

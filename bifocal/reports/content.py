@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 import cv2
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from bifocal.files.made_from import MadeFrom, check_maps, photos_of
 from bifocal.files.photos import photo_infos
 from bifocal.files.strips import ROWS, colour_strips
+from bifocal.model.diagnostics import Diagnostics
 from bifocal.model.doubts import check_scale
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.grid import Bounds
@@ -177,7 +178,7 @@ class PairContent:
     task: ReportTask
     pair: Pair
     source: Path
-    setup: Mapping[str, Any]
+    setup: Diagnostics
     solution: SolvedSurvey | None
     photos: tuple[ReportedPhoto, ...]
     relief: ReliefMap | None
@@ -199,7 +200,7 @@ class PairContent:
     @property
     def deviations(self) -> Sequence[Mapping[str, float]]:
         """Standard deviations of each camera by the keys of a set's file, where known."""
-        sigmas = self.setup.get("standard_deviations", {})
+        sigmas: Any = self.setup.get("standard_deviations", {})
         if self.of_set is not None:
             return sigmas or [{}] * len(self.of_set)
         keys = {"distance": "distance{}", "nadir": "nadir{}", "tilt_deg": "tilt{}_deg",
@@ -310,7 +311,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
         task=task,
         pair=pair,
         source=source,
-        setup=setup if isinstance(setup, dict) else {},
+        setup=cast("Diagnostics", setup if isinstance(setup, dict) else {}),
         solution=solution,
         of_set=of_set,
         photos=_photos(of_set or pair) if pictures else (),

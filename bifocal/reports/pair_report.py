@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bifocal.media import media_words
+from bifocal.model.diagnostics import ControlResidual
 from bifocal.model.doubts import MISFITS, doubts_of, untold
 from bifocal.model.orientation_precision import pinhole
 from bifocal.model.photo import Photo
@@ -227,7 +227,7 @@ def _residuals(content: PairContent, say: Words) -> Iterator[Block]:
     yield from _lengths(content, say)
 
 
-def _control_row(row: Mapping[str, Any], say: Words) -> list[str]:
+def _control_row(row: ControlResidual, say: Words) -> list[str]:
     values = row.get("residual_px") or [v and 1000 * v for v in row["off"]]
     residuals = [f"{v:.2f}" if isinstance(v, int | float) else "-" for v in values]
     test = row.get("test")
@@ -266,7 +266,9 @@ def _foundations(content: PairContent, say: Words) -> Iterator[Block]:
         shown = "-" if sigma is None else f"{sigma:.2f} px"
         counts = {"control": len(content.control_ids), "ties": ties.get("count", 0)}
         yield Paragraph(text=say("rest_measured", sigma=shown, **counts))
-        deviations = {} if content.of_set is not None else setup.get("standard_deviations", {})
+        deviations: Mapping[str, float] = (
+            {} if content.of_set is not None else setup.get("standard_deviations", {})
+        )
 
         def share(key: str) -> str:
             value = deviations.get(key)
