@@ -116,17 +116,11 @@ def sharpen(
     parallax = (upper - lower) * per_relief
     band = ~swept & (parallax > max(EDGES.least_step, EDGES.noise_steps * typical))
     result = relief.copy()
-    far, near = _features(frame.image1), _features(frame.image2)
-    guide = _GuidedFilter(far[..., 0])
+    fit = Fit(frame, typical)
+    misfits = [fit.misfit(candidate) for candidate in (relief, upper, lower)]
+    misfit_kept, high, low = (fit.smooth(misfit) for misfit in misfits)
     precise = precision(typical)
-    limits = precise * np.array(EDGES.limits) + (1 - precise) * np.array(EDGES.imprecise_limits)
-    grey, gradient = limits.tolist()
-    misfits = [
-        _mismatch(frame, far, near, candidate, grey, gradient)
-        for candidate in (relief, upper, lower)
-    ]
-    misfit_kept, high, low = (guide.smooth(misfit) for misfit in misfits)
-    textured = _textured(frame)
+    textured = textured_share(frame)
     misfit_kept += np.float32(precise) * textured * _ramp(median, per_relief) - np.float32(
         EDGES.favour
     )
@@ -169,13 +163,59 @@ def _margin(frame: Frame, median: Float32Array) -> Float32Array:
     )
 
 
-def _textured(frame: Frame) -> Float32Array:
+def textured_share(frame: Frame) -> Float32Array:
     """Return how far photo 1 has the contrast to tell surfaces by, 0 to 1."""
     grey = frame.image1.astype(np.float32)
     side = (EDGES.contrast_window, EDGES.contrast_window)
     mean = cv2.blur(grey, side)
     spread = np.sqrt(np.maximum(cv2.blur(grey * grey, side) - mean * mean, 0))
     return np.asarray(np.clip(spread / np.float32(EDGES.contrast) - np.float32(0.25), 0, 1))
+
+
+class Fit:
+    """How badly photo 2 fits photo 1 at reliefs, pixel by pixel and averaged between edges.
+
+    Parameters
+    ----------
+    frame : Frame
+    typical : float
+        Precision of matching, typical of the frame. [px]
+    """
+
+    def __init__(self, frame: Frame, typical: float) -> None:
+        self.frame = frame
+        precise = precision(typical)
+        limits = precise * np.array(EDGES.limits) + (1 - precise) * np.array(EDGES.imprecise_limits)
+        self.most_grey, self.most_gradient = limits.astype(np.float32)
+        self.far, self.near = _features(frame.image1), _features(frame.image2)
+        self.image = self.far[..., 0]
+        self.mean = _blur(self.image)
+        self.spread = _blur(self.image * self.image) - self.mean * self.mean + EDGES.softness
+
+    def misfit(self, relief: Float32Array) -> Float32Array:
+        """Return how badly photo 2 fits photo 1 at a relief. [grey levels]"""
+        columns, rows = zoom_map(self.frame, relief)
+        mode = cv2.BORDER_REPLICATE
+        moved = cv2.remap(self.near, columns, rows, cv2.INTER_LINEAR, borderMode=mode)
+        off = cv2.absdiff(moved, self.far)
+        total = off[..., 1] + off[..., 2]
+        np.minimum(total, self.most_gradient, out=total)
+        grey = np.minimum(off[..., 0], self.most_grey)
+        grey *= np.float32(EDGES.grey_share)
+        total += grey
+        return total
+
+    def smooth(self, values: Float32Array) -> Float32Array:
+        """Return values averaged within a window, but not across edges of photo 1."""
+        mean = _blur(values)
+        slope = _blur(self.image * values)
+        slope -= self.mean * mean
+        slope /= self.spread
+        mean -= slope * self.mean
+        result = _blur(slope)
+        result *= self.image
+        result += _blur(mean)
+        return result
 
 
 def _features(image: np.ndarray) -> Float32Array:
@@ -186,47 +226,6 @@ def _features(image: np.ndarray) -> Float32Array:
     return np.asarray(cv2.merge([grey, across, down]))
 
 
-def _mismatch(
-    frame: Frame,
-    far: Float32Array,
-    near: Float32Array,
-    relief: Float32Array,
-    most_grey: float,
-    most_gradient: float,
-) -> Float32Array:
-    """Return how badly photo 2 fits photo 1 at given relief. [grey levels]"""
-    columns, rows = zoom_map(frame, relief)
-    moved = cv2.remap(near, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    off = cv2.absdiff(moved, far)
-    total = off[..., 1] + off[..., 2]
-    np.minimum(total, np.float32(most_gradient), out=total)
-    grey = np.minimum(off[..., 0], np.float32(most_grey))
-    grey *= np.float32(EDGES.grey_share)
-    total += grey
-    return total
-
-
-class _GuidedFilter:
-    """Guided filter: averages within a window, but not across edges of the guiding image."""
-
-    def __init__(self, image: Float32Array) -> None:
-        self.image = image
-        self.mean = self._blur(image)
-        self.spread = self._blur(image * image) - self.mean * self.mean + EDGES.softness
-
-    def smooth(self, values: Float32Array) -> Float32Array:
-        """Return the values smoothed."""
-        mean = self._blur(values)
-        slope = self._blur(self.image * values)
-        slope -= self.mean * mean
-        slope /= self.spread
-        mean -= slope * self.mean
-        result = self._blur(slope)
-        result *= self.image
-        result += self._blur(mean)
-        return result
-
-    @staticmethod
-    def _blur(values: np.ndarray) -> Float32Array:
-        side = 2 * EDGES.window + 1
-        return np.asarray(cv2.blur(values, (side, side)))
+def _blur(values: np.ndarray) -> Float32Array:
+    side = 2 * EDGES.window + 1
+    return np.asarray(cv2.blur(values, (side, side)))

@@ -38,6 +38,7 @@ import numpy as np
 from bifocal.model.grid import Grid
 from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import (
+    between_edges,
     edges,
     evidence,
     flow,
@@ -171,6 +172,8 @@ STAGES = (
           "frame relief matched typical half", "relief"),
     Stage("plane patches", plane_patches.on_plain_walls,
           "frame relief half", "relief unpatched"),
+    Stage("smoothed between edges", between_edges.smoothed,
+          "frame relief support swept half", "relief"),
     Stage("sigma", lambda frame, relief, matched, valid: (
               flow.sigma_of_relief(frame, relief, matched.sigma_px), valid),
           "frame relief matched valid", "sigma measured", needed=True),
