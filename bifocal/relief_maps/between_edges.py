@@ -65,9 +65,8 @@ BETWEEN_EDGES = BetweenEdgesTuning()
 
 
 def smoothed(
-    frame: Frame, relief: Float32Array, support: BoolArray, swept: BoolArray,
-    half: Frame | None,
-) -> Float32Array:  # fmt: skip
+    frame: Frame, relief: Float32Array, support: BoolArray, swept: BoolArray
+) -> Float32Array:
     """Return relief whose doubtful pixels run on smoothly from what is validated around them.
 
     Parameters
@@ -77,11 +76,9 @@ def smoothed(
         Of the pixels of photo 1. [m]
     support, swept : ndarray of bool
         Pixels to be believed, and those that a sweep found: they are left alone.
-    half : Frame, optional
-        Given for plain walls, which are left alone: they are put on plane patches.
     """
     believed = support | swept
-    if half is not None or not believed.any():
+    if not believed.any():
         return relief
     per_relief = parallax_per_metre(frame)
     smoother = _Smoother(*_conductances(frame, relief * per_relief, believed))

@@ -173,7 +173,7 @@ STAGES = (
     Stage("plane patches", plane_patches.on_plain_walls,
           "frame relief half", "relief unpatched"),
     Stage("smoothed between edges", between_edges.smoothed,
-          "frame relief support swept half", "relief"),
+          "frame relief support swept", "relief"),
     Stage("sigma", lambda frame, relief, matched, valid: (
               flow.sigma_of_relief(frame, relief, matched.sigma_px), valid),
           "frame relief matched valid", "sigma measured", needed=True),
