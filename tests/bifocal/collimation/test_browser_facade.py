@@ -96,7 +96,7 @@ def test_a_facade_from_two_photos_to_the_drawing_by_clicks_alone(
         assert along[-1] == pytest.approx(6.0, abs=0.05)
         with page.tab.expect_download() as got:
             page.click("profile-xlsx")
-        sheet = openpyxl.load_workbook(got.value.path())["Profile"]
+        sheet = openpyxl.load_workbook(io.BytesIO(Path(got.value.path()).read_bytes()))["Profile"]
         assert sheet.cell(sheet.max_row, 1).value == pytest.approx(along[-1], abs=1e-4)
         page.click("profile-keep")
         page.tab.get_by_test_id("ortho-swipe").fill("0")
