@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from scipy.linalg.lapack import spttrf, spttrs
 
-from bifocal.relief_maps.edges import Fit, textured_share
+from bifocal.relief_maps.edges import PhotoFit, textured_share
 from bifocal.relief_maps.frame import Frame, parallax_per_metre
 from photocore.arrays import BoolArray, Float32Array
 
@@ -82,7 +82,7 @@ def smoothed(
         return relief
     per_relief = parallax_per_metre(frame)
     smoother = _Smoother(*_conductances(frame, relief * per_relief, believed))
-    fit = Fit(frame, 0.0)  # as precise photos: imprecise ones have the most to gain
+    fit = PhotoFit(frame, 0.0)  # as precise photos: imprecise ones have the most to gain
     misfit = fit.smooth(fit.misfit(relief))
     over = np.maximum(misfit - np.median(misfit[believed]), 0)
     doubtful = BETWEEN_EDGES.doubtful * np.exp(-over / np.float32(BETWEEN_EDGES.misfit))
@@ -121,16 +121,10 @@ def _conductances(
 
 
 class _Smoother:
-    """Smooths pictures by rows and columns in turn; the equations are factored once."""
+    """Smooths pictures by rows and columns in turn."""
 
     def __init__(self, rows: Float32Array, columns: Float32Array) -> None:
-        count = BETWEEN_EDGES.sweeps
-        self.sweeps = []
-        for sweep in range(count):
-            # Weaker from sweep to sweep, lest stripes remain (Min et al. 2014, equation 13).
-            share = 1.5 * BETWEEN_EDGES.smoothness * 4.0 ** (count - 1 - sweep) / (4.0**count - 1)
-            stiff = [np.float32(share) * one for one in (rows, np.ascontiguousarray(columns.T))]
-            self.sweeps.append(tuple(_factored(one) for one in stiff))
+        self.rows, self.columns = rows, np.ascontiguousarray(columns.T)
 
     def mean(self, values: Float32Array, weight: Float32Array) -> Float32Array:
         """Return the smoothed mean of values with weights."""
@@ -140,12 +134,16 @@ class _Smoother:
     def smooth(self, pictures: Float32Array) -> Float32Array:
         """Return pictures smoothed, shape (n, height, width)."""
         count, height, width = pictures.shape
-        for rows, columns in self.sweeps:
-            flat = spttrs(*rows, pictures.reshape(count, -1).T)[0].T
-            turned = flat.reshape(count, height, width).transpose(0, 2, 1)
-            flat = spttrs(*columns, turned.reshape(count, -1).T)[0].T
-            pictures = flat.reshape(count, width, height).transpose(0, 2, 1)
-        return np.ascontiguousarray(pictures)
+        sweeps = BETWEEN_EDGES.sweeps
+        for sweep in range(sweeps):
+            # Weaker from sweep to sweep, lest stripes remain (Min et al. 2014, equation 13).
+            share = 1.5 * BETWEEN_EDGES.smoothness * 4.0 ** (sweeps - 1 - sweep) / (4.0**sweeps - 1)
+            # Factored anew each time: kept, the factors of all are the most of a stage's memory.
+            flat = spttrs(*_factored(np.float32(share) * self.rows), pictures.reshape(count, -1).T)
+            turned = flat[0].T.reshape(count, height, width).transpose(0, 2, 1)
+            flat = spttrs(*_factored(np.float32(share) * self.columns), turned.reshape(count, -1).T)
+            pictures = flat[0].T.reshape(count, width, height).transpose(0, 2, 1)
+        return pictures
 
 
 def _factored(stiff: Float32Array) -> tuple[Float32Array, Float32Array]:

@@ -116,7 +116,7 @@ def sharpen(
     parallax = (upper - lower) * per_relief
     band = ~swept & (parallax > max(EDGES.least_step, EDGES.noise_steps * typical))
     result = relief.copy()
-    fit = Fit(frame, typical)
+    fit = PhotoFit(frame, typical)
     misfits = [fit.misfit(candidate) for candidate in (relief, upper, lower)]
     misfit_kept, high, low = (fit.smooth(misfit) for misfit in misfits)
     precise = precision(typical)
@@ -172,7 +172,7 @@ def textured_share(frame: Frame) -> Float32Array:
     return np.asarray(np.clip(spread / np.float32(EDGES.contrast) - np.float32(0.25), 0, 1))
 
 
-class Fit:
+class PhotoFit:
     """How badly photo 2 fits photo 1 at reliefs, pixel by pixel and averaged between edges.
 
     Parameters
