@@ -24,8 +24,7 @@ import numpy as np
 
 from multimedia import Camera, FlatInterface, Layers, radial_shift_ratio
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import Pinhole, project_with_jacobian
-from photocore.camera.rotation import by_rotation
+from photocore.camera import Pinhole, by_rotation, project_with_jacobian
 
 #: What a path is differentiated by after its indices and thicknesses: the way to the first
 #: interface [m], a small turn of the interfaces about the axes of the plane frame [rad].

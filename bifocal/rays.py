@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from bifocal.equations import relief_displacement
 from bifocal.media import MediaPath, ObjectRays
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.distortion import inverse_2x2
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import Pinhole, inverse_2x2
 
 
 class Foot(NamedTuple):

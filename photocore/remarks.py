@@ -16,7 +16,7 @@ from string import Formatter
 from typing import Any
 
 from photocore.textfile import packaged
-from photocore.workbook.making.words import LANGUAGES
+from photocore.workbook import LANGUAGES
 
 #: Entries of this section are single words: looked up only as values of blanks ``{...!s}``.
 WORDS = "word."

@@ -153,12 +153,12 @@ def importers(root: Path) -> dict[str, set[str]]:
             parts = file.relative_to(root).with_suffix("").parts
             files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
     public = {}
-    for package in PACKAGES:
-        stub = root / package / "__init__.pyi"
-        for source, name in (
-            _imported(package, stub.read_text("utf-8"), True) if stub.exists() else ()
-        ):
+    for stub in (one for part in PACKAGES for one in (root / part).rglob("__init__.pyi")):
+        package = ".".join(stub.relative_to(root).parent.parts)
+        for source, name in _imported(package, stub.read_text("utf-8"), True):
             public[package, name] = source
+    for package, name in list(public):  # a package may offer what the door of a room does
+        public[package, name] = public.get((public[package, name], name), public[package, name])
     found = defaultdict(set)
     for module, file in files.items():
         text = file.read_text(encoding="utf-8")

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from scipy.special import fdtri
 
-from bifocal.model.lens import Lens
+from bifocal.model import Lens
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray, IntArray
-from photocore.camera.charuco import BoardView
+from photocore.camera import BoardView
 from photocore.errors import GeometryError, InputError
 
 #: A photo whose RMS is this many times the median is named; beyond the second it is left out.

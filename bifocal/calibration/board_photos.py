@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.calibration.board_calibration import Calibration, lens_of_views
-from bifocal.model.image import as_grey
+from bifocal.model import as_grey
 from photocore.arrays import ByteArray
-from photocore.camera.boards import checked_board, detect_board, find_board_size
-from photocore.camera.charuco import BoardView
+from photocore.camera import BoardView, checked_board, detect_board, find_board_size
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 

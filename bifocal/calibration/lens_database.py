@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.lens import Lens
+from bifocal.model import Lens
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import camera_matrix
+from photocore.camera import camera_matrix
 from photocore.errors import InputError, MissingExtraError
 from photocore.images import ImageInfo, image_info
 

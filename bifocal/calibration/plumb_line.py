@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from bifocal.model.lens import Lens
+from bifocal.model import Lens
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray, as_points
-from photocore.camera.pinhole import camera_matrix
+from photocore.camera import camera_matrix
 from photocore.errors import GeometryError, InputError
 
 #: A line must be this share of the photo's width to tell anything of distortion.

@@ -20,8 +20,8 @@ from bifocal.calibration.plumb_line import (
     calibrate_from_lines,
     find_straight_edges,
 )
-from bifocal.files.exif_judge import judged_focal
-from bifocal.model.lens import SIGMA_FOCAL, Lens
+from bifocal.files import judged_focal
+from bifocal.model import SIGMA_FOCAL, Lens
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress

@@ -7,3 +7,7 @@ shares pairs among processes, `dask_cluster` and `shipping` among machines, `fol
 them apart. `whole_wall` makes what needs all pairs, `rectification` what needs one photo only;
 `verification` holds a delivery against its records. `workflow` ties the commands to them.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bifocal.campaigns.pair_steps import PairJob, known_of, tables_of
-from bifocal.faces.faces_files import read_faces
-from bifocal.model.lens import Lens
-from bifocal.reports.control_survey import refuse_same_names
+from bifocal.faces import read_faces
+from bifocal.model import Lens
+from bifocal.reports import refuse_same_names
 from photocore.decoding import refuse_damaged_jpeg
 from photocore.images import image_info, read_image
 from photocore.textfile import check_file

@@ -19,7 +19,7 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
-from bifocal.model.doubts import untold
+from bifocal.model import untold
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.provenance import FileHashes, recording

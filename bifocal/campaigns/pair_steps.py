@@ -13,17 +13,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bifocal.campaigns.step_store import Step, StepRecord, read_record
-from bifocal.faces.faces_files import faces_path
+from bifocal.faces import faces_path
 from bifocal.options import DRAWING, FILES, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT, SET_UP, typed
 from photocore.cli import Progress
 from photocore.errors import InputError
 from photocore.textfile import file_name
 
 if TYPE_CHECKING:
-    from bifocal.model.points import Points
-    from bifocal.model.world_frame import WorldFrame
-    from bifocal.orthophotos.ortho_workflow import OrthoTask
-    from bifocal.survey.solved_survey import SolvedSurvey
+    from bifocal.model import Points, WorldFrame
+    from bifocal.orthophotos import OrthoTask
+    from bifocal.survey import SolvedSurvey
 
 #: What may be wanted of a pair, in the order of work.
 PRODUCTS = ("relief", "points", "ortho", "drawing", "view", "report")
@@ -196,8 +195,8 @@ def _some(job: PairJob, *names: str) -> dict[str, Any]:
 
 def refusal(job: PairJob) -> str:
     """Return why a pair cannot be aligned as it is described; empty where nothing is missing."""
-    from bifocal.networks.set_workflow import way_of_set
-    from bifocal.orientation.align_workflow import AlignOptions, check_way
+    from bifocal.networks import way_of_set
+    from bifocal.orientation import AlignOptions, check_way
 
     step, check = _align_step(job), way_of_set if job.more else check_way
     try:
@@ -216,12 +215,12 @@ def _align_step(job: PairJob) -> Step:
     options = _some(job, "columns", *SET_UP)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.orientation.align_workflow import AlignOptions, align_photos
+        from bifocal.orientation import AlignOptions, align_photos
 
         out = place / job.product("align").name
         align_options = AlignOptions.from_given({**options, **files})
         if job.more:
-            from bifocal.networks.set_workflow import align_photo_set
+            from bifocal.networks import align_photo_set
 
             return align_photo_set(job.photos, out, align_options, progress=progress).remarks
         picture = out.with_suffix("").with_suffix(".pair.png")
@@ -281,7 +280,7 @@ def _points_step(job: PairJob) -> Step:
     options = _some(job, "language", "unit", "columns")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        from bifocal.workbook.output import write_result
+        from bifocal.workbook import write_result
 
         solution = _solved(job, tables_of(job), options)
         write_result(place / f"{job.title}_points.xlsx", solution)
@@ -299,8 +298,8 @@ def _points_step(job: PairJob) -> Step:
 
 def _solved(job: PairJob, tables: Mapping[str, Path], options: Mapping[str, Any]) -> SolvedSurvey:
     """Return the points of tables, solved and compared."""
-    from bifocal.model.photo_set import pair_or_set
-    from bifocal.reports.control_survey import is_exchanged, solve_control
+    from bifocal.model import pair_or_set
+    from bifocal.reports import is_exchanged, solve_control
 
     return solve_control(
         job.pair_path, **{"control": None, **tables}, photos=len(job.photos),
@@ -312,7 +311,7 @@ def _solved(job: PairJob, tables: Mapping[str, Path], options: Mapping[str, Any]
 
 def _checked(job: PairJob) -> tuple[int, float, float] | None:
     """Return check points, and their RMSE in X, Y and in relief; None if too few prove it. [m]"""
-    from bifocal.survey.tolerances import FEW
+    from bifocal.survey import FEW
 
     if "check" not in job.files:
         return None
@@ -323,7 +322,7 @@ def _checked(job: PairJob) -> tuple[int, float, float] | None:
 
 
 def _ortho_task(job: PairJob, options: Mapping[str, Any]) -> OrthoTask:
-    from bifocal.orthophotos.ortho_workflow import OrthoTask
+    from bifocal.orthophotos import OrthoTask
 
     return OrthoTask.from_given(
         {key: options[key] for key in (*PICTURE, "gsd") if key in options},
@@ -335,7 +334,7 @@ def _ortho_step(job: PairJob) -> Step:
     options = _some(job, *PICTURE, "gsd", "cog")
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.orthophotos.ortho_workflow import make_ortho
+        from bifocal.orthophotos import make_ortho
 
         out = place / job.product("ortho").name
         task = _ortho_task(job, options)
@@ -350,8 +349,8 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     tables = {role: job.files[role] for role in ("control", "check", "mark") if role in job.files}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
-        from bifocal.reports.accuracy import wall_in_words
+        from bifocal.orthophotos import DeliverTask, deliver
+        from bifocal.reports import wall_in_words
 
         drawing = {key: options[key] for key in (*DRAWING, "language") if key in options}
         wish = DeliverTask(
@@ -372,7 +371,7 @@ def _drawing_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
 
 def known_of(job: PairJob, frame: WorldFrame | None = None) -> dict[str, Points]:
     """Return the coordinates that the tables of a pair hold; E, N, H in a frame's X, Y, r."""
-    from bifocal.orientation.control_points import known_points
+    from bifocal.orientation import known_points
 
     reading = _some(job, "unit", "columns") | {"names": [str(path) for path in job.photos]}
     return {
@@ -383,9 +382,8 @@ def known_of(job: PairJob, frame: WorldFrame | None = None) -> dict[str, Points]
 
 def _points_to_draw(job: PairJob, *, solved: bool) -> dict[str, Points]:
     """Return what a drawing for CAD holds: known points where they are, and as they were solved."""
-    from bifocal.files.point_tables import read_survey_points
-    from bifocal.model.photo_set import pair_or_set
-    from bifocal.model.world_frame import WorldFrame
+    from bifocal.files import read_survey_points
+    from bifocal.model import WorldFrame, pair_or_set
 
     points = known_of(job, WorldFrame.of(pair_or_set(job.pair_path).extra))
     if solved:
@@ -399,7 +397,7 @@ def _view_step(job: PairJob, earlier: tuple[str, ...]) -> Step:
     ortho = job.ortho_path(earlier)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:  # noqa: ARG001
-        from bifocal.reports.view_workflow import view_relief
+        from bifocal.reports import view_relief
 
         view_relief(job.product("relief"), place / job.product("view").name, ortho=ortho, **options)
         return ()
@@ -416,7 +414,8 @@ def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
         options.setdefault("scale", SCALE)
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.reports.workflow import ReportTask, StepTold, write_report
+        from bifocal.reports import StepTold, write_report
+        from bifocal.reports.workflow import ReportTask
 
         records = {name: job.told.get(name) or read_record(job.folder / name) for name in earlier}
         if not options["times"]:
@@ -443,8 +442,8 @@ def _report_step(job: PairJob, before: tuple[Step, ...]) -> Step:
 
 def proven(job: PairJob) -> list[str]:
     """Return what the compared points of a finished pair prove, for the terminal."""
-    from bifocal.reports.accuracy import verdict_in_words
-    from bifocal.reports.content import ReportTask, read_content
+    from bifocal.reports import read_content, verdict_in_words
+    from bifocal.reports.content import ReportTask
 
     settings: dict[str, Any] = {k: job.options[k] for k in ReportTask.PLAIN if k in job.options}
     if "drawing" in job.products:

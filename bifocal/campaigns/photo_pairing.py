@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from bifocal.campaigns.survey_file import FORMAT
-from bifocal.matching.features import Features, find_features, match_features
+from bifocal.matching import Features, find_features, match_features
 from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError

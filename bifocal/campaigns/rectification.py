@@ -10,23 +10,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.model.grid import Bounds, Grid
-from bifocal.model.image import as_grey, as_photo
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.model.photo_alone import PhotoAlone
-from bifocal.model.points import Points
-from bifocal.model.surface import FlatSurface
-from bifocal.orientation import one_photo
-from bifocal.orientation.align_workflow import KnownLens, check_inside, interior_of_photo
-from bifocal.orientation.control_points import Control, read_control
-from bifocal.orientation.one_photo import OrientedPhoto
-from bifocal.orientation.tuning import CONTROL
-from bifocal.orthophotos.compose import orthophoto
-from bifocal.orthophotos.deliver_workflow import DeliverTask, Delivery, deliver
-from bifocal.orthophotos.ortho_image import Orthophoto
-from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho, planned_grid
-from bifocal.orthophotos.tiles import RasterResult
+from bifocal.model import (
+    FARTHEST_WALL,
+    Bounds,
+    FlatSurface,
+    Grid,
+    Interior,
+    PhotoAlone,
+    Points,
+    as_grey,
+    as_photo,
+)
+from bifocal.orientation import (
+    CONTROL,
+    Control,
+    KnownLens,
+    OrientedPhoto,
+    check_inside,
+    interior_of_photo,
+    one_photo,
+    read_control,
+)
+from bifocal.orthophotos import (
+    DeliverTask,
+    Delivery,
+    Orthophoto,
+    OrthoTask,
+    RasterResult,
+    deliver,
+    make_ortho,
+    orthophoto,
+    planned_grid,
+)
 from bifocal.remarks import in_language, remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray, as_points

@@ -17,19 +17,18 @@ from typing import cast
 from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.campaigns.step_store import FORMAT, RECORD, WholeRecord, read_record, record_key
 from bifocal.campaigns.workflow import facade
-from bifocal.files.hash_list import SUMS
-from bifocal.files.point_tables import read_survey_points
-from bifocal.model.pair import Pair
+from bifocal.files import SUMS, read_survey_points
+from bifocal.model import Pair
 from bifocal.options import FILES
 from bifocal.remarks import remark
-from bifocal.reports.worked_point import WorkedPoint, recomputed
+from bifocal.reports import WorkedPoint, recomputed
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import temporary_folder
 from photocore.provenance import file_hash, program
 from photocore.textfile import check_name, read_text
-from photocore.workbook.reading.package import UNPACKING, check_names
+from photocore.workbook import UNPACKING, check_names
 
 #: A file of an archive that grows more when unpacked, and is larger, is no product of ours.
 _RATIO, _LARGE = 250, 64 << 20

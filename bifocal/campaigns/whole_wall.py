@@ -32,7 +32,7 @@ def joint_step(jobs: Sequence[PairJob]) -> Step:
     options = {name: settings[name] for name in JOINT_OPTIONS if name in settings}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.networks.joint_workflow import JointTask, adjust_pairs
+        from bifocal.networks import JointTask, adjust_pairs
 
         task = JointTask(
             control=tuple(job.files.get("control") for job in jobs),
@@ -61,7 +61,7 @@ def mosaic_step(jobs: Sequence[PairJob], options: Mapping[str, Any]) -> Step:
     files |= {f"relief {k}": path for k, path in enumerate(reliefs)}
 
     def make(place: Path, progress: Progress) -> tuple[str, ...]:
-        from bifocal.orthophotos.mosaic_workflow import make_mosaic
+        from bifocal.orthophotos import make_mosaic
 
         out = place / "mosaic.tif"
         return tuple(make_mosaic(orthos, out, relief=reliefs, progress=progress, **options).remarks)

@@ -46,7 +46,7 @@ def command(
     for each PAIR, and points.csv with coordinates, precision and misfits. What contradicts the
     rest takes no part and is named. Fewer than three control points: the first pair is held.
     """
-    from bifocal.networks.joint_workflow import JointTask, adjust_pairs
+    from bifocal.networks import JointTask, adjust_pairs
 
     tables = {role: _tables(options[role]) for role in ("control", "check")}
     task = JointTask(**{**options, **tables, "unit": options["unit"] or ""})

@@ -17,8 +17,8 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from bifocal.model.diagnostics import Diagnostics
-    from bifocal.orientation.alignment import Alignment
+    from bifocal.model import Diagnostics
+    from bifocal.orientation import Alignment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +77,14 @@ def command(
     the others' lenses; the control table has columns col1, row1 to coln, rown, blank where a photo
     does not show the point.
     """
-    from bifocal.workbook.pair_workflow import is_workbook
+    from bifocal.workbook import is_workbook
 
     if is_workbook(far):
         _align_workbook(far, near, out, given["sigma_distance"], overwrite, as_json)
         return
     if near is None:
         raise click.UsageError("Give two photos, FAR and NEAR, or a survey workbook as FAR.")
-    from bifocal.orientation.align_workflow import AlignOptions, align_photos, alignment_as_dict
+    from bifocal.orientation import AlignOptions, align_photos, alignment_as_dict
 
     if more or out.name.lower().endswith(".photos.json"):
         _align_set((far, near, *more), out, given, overwrite, as_json)
@@ -106,8 +106,8 @@ def _align_set(
     photos: tuple[Path, ...], out: Path, given: dict[str, Any], overwrite: bool, as_json: bool
 ) -> None:
     """Set photos up together."""
-    from bifocal.networks.set_workflow import align_photo_set, set_as_dict
-    from bifocal.orientation.align_workflow import AlignOptions
+    from bifocal.networks import align_photo_set, set_as_dict
+    from bifocal.orientation import AlignOptions
 
     if given["picture"] is not None:
         raise click.UsageError("--picture: is drawn of pairs; leave it out with a set of photos.")
@@ -132,7 +132,7 @@ def _align_workbook(
     book: Path, near: Path | None, out: Path, sigma: float, overwrite: bool, as_json: bool
 ) -> None:
     """Write the pair of a workbook's set-up as it is typed."""
-    from bifocal.workbook.pair_workflow import write_pair
+    from bifocal.workbook import write_pair
 
     context = click.get_current_context()
     typed = [
@@ -167,8 +167,8 @@ def _align_workbook(
 
 def _lines(alignment: Alignment) -> Iterator[str]:
     """Yield the set-up for people."""
-    from bifocal.orientation.align_workflow import basis
-    from bifocal.reports.accuracy import wall_in_words
+    from bifocal.orientation import basis
+    from bifocal.reports import wall_in_words
 
     yield from alignment.words
     ties = alignment.setup["common_points"]

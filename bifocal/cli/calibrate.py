@@ -15,7 +15,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption, PatternOption
 
 if TYPE_CHECKING:
-    from bifocal.calibration.board_calibration import Calibration
+    from bifocal.calibration import Calibration
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,7 +50,7 @@ def command(options: CompareCommand) -> None:
     every change is held against them. The folder gets the difference as GeoTIFF, changed
     regions as DXF, CSV and XLSX, and a report.
     """
-    from bifocal.comparison.workflow import compare_files
+    from bifocal.comparison import compare_files
 
     with progress_bar("comparison", quiet=options.as_json) as progress:
         done = compare_files(

@@ -33,7 +33,7 @@ def command(options: DoctorCommand) -> None:
     installed, which cells show something else when it calculates them anew.
     """
     from photocore.machine import diagnosis, diagnosis_lines, office
-    from photocore.workbook.changing.recalculation import examination_lines, examine
+    from photocore.workbook import examination_lines, examine
 
     if options.book is None:
         report = diagnosis()

@@ -44,7 +44,7 @@ class ExportCommand:
 @declared(ExportCommand)
 def command(options: ExportCommand) -> None:
     """Write the points of a solved survey (RESULT: .xlsx, .ods or .csv) for other programs."""
-    from bifocal.workbook.export_workflow import export
+    from bifocal.workbook import export
 
     for note in export(
         options.result,

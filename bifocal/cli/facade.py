@@ -26,8 +26,7 @@ from photocore.options import UNSET, Argument, Typed, declared
 from photocore.shared_options import CogOption, JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from bifocal.campaigns.pair_job import PairOutcome
-    from bifocal.campaigns.pair_steps import PairJob
+    from bifocal.campaigns import PairJob, PairOutcome
 
 #: What to look at first.
 _TO_OPEN = ("report/*.html", "drawing/*.pdf", "points/*.xlsx", "relief/*.png", "ortho/*.tif")
@@ -84,7 +83,7 @@ def command(
     its own within DIR. Run it again, and only what changed is made anew; stopped, it goes on where
     it was. Three photos and more are a set: see `bifocal align`.
     """
-    from bifocal.campaigns.workflow import facade, facade_job
+    from bifocal.campaigns import facade, facade_job
 
     naming = {name: given.pop(name) for name in ("name", "products", "overwrite")}
     job = facade_job(far, near, out, more=more, given=given, **naming)
@@ -95,7 +94,7 @@ def command(
 
 def _lines(job: PairJob, outcome: PairOutcome) -> list[str]:
     """Return what was made where, and how good it proved to be, for people."""
-    from bifocal.campaigns.pair_steps import proven
+    from bifocal.campaigns import proven
 
     lines = []
     for step in (*outcome.kept, *outcome.done):

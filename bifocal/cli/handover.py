@@ -46,7 +46,7 @@ def command(options: HandoverCommand) -> None:
     PAIR is a pair file. The page needs neither network nor program; distances and heights are
     measured on orthophoto and relief by two clicks.
     """
-    from bifocal.reports.handover import HandoverTask, write_handover
+    from bifocal.reports import HandoverTask, write_handover
 
     facts = write_handover(
         options.pair,

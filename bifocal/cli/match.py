@@ -15,7 +15,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import ChangedPhotosOption, JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from bifocal.workbook.match_workflow import MatchSummary, SetSummary
+    from bifocal.workbook import MatchSummary, SetSummary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,11 +60,16 @@ def command(options: MatchCommand) -> None:
     Discs, chequers and coded markers are found and measured by their centres; natural detail is
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
-    from bifocal.matching.matching import MatchSettings
-    from bifocal.survey.set_survey import best_pair
-    from bifocal.workbook.match_workflow import match_photos, match_set_file, match_summary
-    from bifocal.workbook.pair_workflow import is_workbook, read_pair
-    from bifocal.workbook.sources import set_or_pair
+    from bifocal.matching import MatchSettings
+    from bifocal.survey import best_pair
+    from bifocal.workbook import (
+        is_workbook,
+        match_photos,
+        match_set_file,
+        match_summary,
+        read_pair,
+        set_or_pair,
+    )
 
     low, high = options.relief_min, options.relief_max
     if low is not None and high is not None and low >= high:

@@ -14,7 +14,7 @@ def command(options: MosaicCommand) -> None:
     Seams run where the rasters agree, away from edges of the relief and from hidden places;
     exposure becomes that of the first file and colours fade into each other. Sizes are not limited.
     """
-    from bifocal.orthophotos.mosaic_workflow import make_mosaic
+    from bifocal.orthophotos import make_mosaic
 
     with progress_bar("mosaic", quiet=options.as_json) as progress:
         result = make_mosaic(

@@ -29,7 +29,7 @@ from photocore.shared_options import (
 )
 
 if TYPE_CHECKING:
-    from bifocal.model.points import Points
+    from bifocal.model import Points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,12 +95,11 @@ def command(
     pixel is taken from the photo that sees it best: 11 is its first photo, 12 the second, 3 a
     transition.
     """
-    from bifocal.faces.faces_files import faces_path, keep_faces
-    from bifocal.files.pair_names import default_title
-    from bifocal.orthophotos.deliver_workflow import DeliverTask, deliver
-    from bifocal.orthophotos.ortho_workflow import OrthoTask, basis_in_words, make_ortho
-    from bifocal.reports.accuracy import wall_in_words
-    from bifocal.workbook.pair_workflow import is_workbook, points_of, read_photos
+    from bifocal.faces import faces_path, keep_faces
+    from bifocal.files import default_title
+    from bifocal.orthophotos import DeliverTask, OrthoTask, basis_in_words, deliver, make_ortho
+    from bifocal.reports import wall_in_words
+    from bifocal.workbook import is_workbook, points_of, read_photos
 
     if out is None and folder is None:
         raise click.UsageError("Give --out FILE, --deliver DIR or both.")

@@ -16,7 +16,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from bifocal.projects.photos_workflow import ProjectPhotos
+    from bifocal.projects import ProjectPhotos
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,8 +79,7 @@ def command(
     that are named, or is that of control points (--control). With --to
     PROJECT is a set of photos or a pair, and OUT a folder for the other program.
     """
-    from bifocal.projects.colmap_workflow import export_photos
-    from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project
+    from bifocal.projects import ProjectOptions, export_photos, photos_from_project
 
     options = ProjectOptions(**{key: value for key, value in given.items() if value is not None})
     if to is not None:

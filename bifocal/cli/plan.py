@@ -16,7 +16,7 @@ from photocore.options import Typed, declared, options_of
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from bifocal.planning.camera_plan import Plan
+    from bifocal.planning import Plan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,9 +75,8 @@ def command(
     Give the lenses and the camera, and one wish: the size of the wall, a scale, a pixel size on
     the wall, or a sigma of the relief.
     """
-    from bifocal.model.pair_media import PairMedia
-    from bifocal.planning.camera_plan import CameraSensor
-    from bifocal.planning.workflow import make_plan, plan_as_dict
+    from bifocal.model import PairMedia
+    from bifocal.planning import CameraSensor, make_plan, plan_as_dict
 
     sensor = wishes.pop("sensor")
     media = {name: wishes.pop(name) for name in options_of(MediaOptions)}

@@ -23,7 +23,7 @@ def command(
     upright and level lines of a façade and one length. What does not lie on the plane is displaced;
     the first line tells by how much at most, and only a second photo removes it.
     """
-    from bifocal.campaigns.rectification import rectify_photo
+    from bifocal.campaigns import rectify_photo
 
     by_points, corners, rectangle, length = (
         given[name] is not None for name in ("control", "corners", "rectangle", "length")

@@ -69,9 +69,9 @@ def command(pair_file: Path, as_json: bool, **wishes: Any) -> None:
     Of a set every pair that promises relief is measured: what one cannot see another fills, and
     where they differ the photos decide.
     """
-    from bifocal.faces.faces_files import faces_path, keep_faces
+    from bifocal.faces import faces_path, keep_faces
     from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-    from bifocal.workbook.pair_workflow import is_workbook, read_pair
+    from bifocal.workbook import is_workbook, read_pair
 
     faces = wishes["faces"]
     wishes["faces"] = faces_path(faces, pair_file)

@@ -27,13 +27,10 @@ def command(survey: tuple[Path, ...], out: Path | None, as_json: bool, **options
     Or give two lists of picks, of photo 1 and of photo 2 (.csv, .xlsx, .dxf), joined by the names
     of the points, with --pair: a pair file, or a survey workbook for its set-up.
     """
-    from bifocal.survey.results import length_unit, point_rows, solution_json, summary
-    from bifocal.survey.setup import Measuring, Taking
-    from bifocal.workbook.output import check_target, write_result
-    from bifocal.workbook.reading.reader import ReadOptions, column_map
-    from bifocal.workbook.workflow import solve
+    from bifocal.survey import Measuring, Taking, length_unit, point_rows, solution_json, summary
+    from bifocal.workbook import ReadOptions, check_target, column_map, solve, write_result
     from photocore.output import check_not_input
-    from photocore.workbook.making.newbook import check_new_workbook
+    from photocore.workbook import check_new_workbook
 
     language, overwrite = options.pop("language"), options.pop("overwrite")
     if out is not None:

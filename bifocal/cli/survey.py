@@ -54,12 +54,14 @@ def command(
     what changed is made anew; stopped or killed at any moment, it goes on where it was. A pair
     that fails stops no other; a table at the end says what failed and how to mend it.
     """
-    from bifocal.campaigns.survey_file import in_survey_words, mosaic_wanted, read_survey_file
-    from bifocal.campaigns.workflow import (
+    from bifocal.campaigns import (
         Machines,
         begin_survey,
+        in_survey_words,
+        mosaic_wanted,
         pairs_in_words,
         plan_survey,
+        read_survey_file,
         run_survey,
     )
 

@@ -59,7 +59,7 @@ def command(options: TemplateCommand) -> None:
 
     Every result is a live formula; the workbook needs neither this program nor macros.
     """
-    from bifocal.workbook.template_workflow import write_template
+    from bifocal.workbook import write_template
 
     write_template(
         options.out,

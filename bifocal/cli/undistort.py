@@ -41,7 +41,7 @@ def command(
     images: tuple[Path, ...], lens: str, out_dir: Path | None, as_json: bool, **options: Any
 ) -> None:
     """Write each photo without lens distortion as NAME_undistorted, same size and scale."""
-    from bifocal.calibration.workflow import undistort_images
+    from bifocal.calibration import undistort_images
 
     if out_dir is not None and not out_dir.is_dir():
         raise click.UsageError(f"--out-dir: the folder {out_dir} does not exist.")

@@ -37,7 +37,7 @@ def command(options: VerifyCommand) -> None:
     from its pixels and the pair file. Nothing is written into the delivery. The digest at the end,
     told by another way (in the letter), proves that the list of hashes was not exchanged as well.
     """
-    from bifocal.campaigns.verification import verify
+    from bifocal.campaigns import verify
 
     with progress_bar("verify", quiet=options.as_json) as progress:
         verification = verify(

@@ -39,7 +39,7 @@ def command(options: ViewCommand) -> None:
     RELIEF is a map of `bifocal relief`. It is thinned to 65 000 points, so that the page is small
     enough to be sent; drag it to turn it, and make the relief higher where it is flat.
     """
-    from bifocal.reports.view_workflow import view_relief
+    from bifocal.reports import view_relief
 
     view_relief(
         options.relief,

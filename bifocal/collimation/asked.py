@@ -8,7 +8,8 @@ from bifocal.collimation.live_orientation import LiveOrientation, live_orientati
 from bifocal.collimation.measures import measure
 from bifocal.collimation.session import Session
 from bifocal.remarks import remark
-from bifocal.survey.wall_precision import WallPrecision, wall_precision
+from bifocal.survey import WallPrecision
+from bifocal.survey.wall_precision import wall_precision
 from photocore.errors import InputError
 
 

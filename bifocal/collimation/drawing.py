@@ -10,9 +10,8 @@ import numpy as np
 from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.records import SurveyState
 from bifocal.collimation.shapes import OUTLINES, places_of
-from bifocal.files.exports import export_points
-from bifocal.model.pair import Pair
-from bifocal.model.points import PointLine, Points
+from bifocal.files import export_points
+from bifocal.model import Pair, PointLine, Points
 from bifocal.remarks import remark
 from photocore.errors import InputError
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from bifocal.collimation.records import SurveyState
 from bifocal.collimation.shapes import commands_for, keep_faces
-from bifocal.faces.faces import Faces
-from bifocal.faces.faces_files import beside
-from bifocal.model.pair import Pair
+from bifocal.faces import Faces, beside
+from bifocal.model import Pair
 
 
 class DrawnFaces:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bifocal.collimation.records import GIVES_SCALE, ScaleLength, SurveyState
-from bifocal.model.length_checks import LengthCheck, length_check
-from bifocal.model.pair import Pair
-from bifocal.orientation.control_points import SiteMeasures
+from bifocal.model import LengthCheck, Pair, length_check
+from bifocal.orientation import SiteMeasures
 from photocore.errors import GeometryError
 from photocore.jsonfile import plain
 

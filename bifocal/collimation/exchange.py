@@ -15,9 +15,9 @@ from bifocal.collimation.proposals import Proposal, ProposalAside
 from bifocal.collimation.records import Change, PickedControl, PickedPoint, SurveyState
 from bifocal.collimation.shapes import places_of
 from bifocal.collimation.survey_on_page import SurveyOnPage
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 from bifocal.remarks import remark
-from bifocal.survey.observations import DOUBT_CODES
+from bifocal.survey import DOUBT_CODES
 from photocore.errors import InputError
 from photocore.provenance import known_hash
 

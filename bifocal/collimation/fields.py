@@ -11,7 +11,7 @@ from bifocal.remarks import remark
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX
 from photocore.errors import InputError
 from photocore.option_types import Number
-from photocore.workbook.making.words import LANGUAGES
+from photocore.workbook import LANGUAGES
 
 Fields = Mapping[str, Any]
 #: Takes a command and a key; returns the value, or raises `FieldError`.

@@ -18,8 +18,8 @@ from bifocal.collimation.live_orientation import control_of, lenses_of
 from bifocal.collimation.live_results import observations
 from bifocal.collimation.session import Session
 from bifocal.collimation.stated_media import lacking, media_of
-from bifocal.model.pair import Pair
-from bifocal.workbook.held_picks import verdict_of_picks
+from bifocal.model import Pair
+from bifocal.workbook import verdict_of_picks
 from photocore.errors import PhotogrammetryError
 
 #: Fewer new points than this come from clicks on the photos themselves, which cannot be others.

@@ -13,40 +13,28 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.campaigns.rectification import rectify_photo
+from bifocal.campaigns import rectify_photo
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.shapes import shapes_from
 from bifocal.collimation.stated_media import media_from_dict
-from bifocal.faces.faces_files import faces_path
-from bifocal.faces.suggestions import suggest_faces
-from bifocal.files.pair_names import default_title
-from bifocal.matching.matching import MatchSettings
-from bifocal.model.geotiff import gsd_at_scale
-from bifocal.model.length_checks import LengthCheck
-from bifocal.model.orientation_precision import NAMES
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.relief_map import ReliefMap
-from bifocal.model.world_frame import WorldFrame
-from bifocal.networks.set_workflow import align_photo_set
+from bifocal.faces import faces_path, suggest_faces
+from bifocal.files import default_title
+from bifocal.matching import MatchSettings
+from bifocal.model import NAMES, LengthCheck, Pair, PhotoSet, ReliefMap, WorldFrame, gsd_at_scale
+from bifocal.networks import align_photo_set
 from bifocal.options.commands import RectifyCommand
-from bifocal.orientation.align_workflow import (
+from bifocal.orientation import (
     AlignOptions,
     KnownLens,
+    SiteMeasures,
     align_photos,
     alignment_as_dict,
 )
-from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orthophotos.deliver_workflow import DPI, DeliverTask, deliver
-from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+from bifocal.orthophotos import DPI, DeliverTask, OrthoTask, deliver, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
-from bifocal.reports.accuracy import wall_in_words
+from bifocal.reports import HandoverTask, report_of, view_relief, wall_in_words, write_handover
 from bifocal.reports.content import ReportTask
-from bifocal.reports.handover import HandoverTask, write_handover
-from bifocal.reports.view_workflow import view_relief
-from bifocal.reports.workflow import report_of
-from bifocal.workbook.match_workflow import match_pair_file
-from bifocal.workbook.pair_workflow import is_workbook, read_pair
+from bifocal.workbook import is_workbook, match_pair_file, read_pair
 from photocore.cli import Progress
 from photocore.errors import GeometryError, PhotogrammetryError
 from photocore.images import image_info, read_grey

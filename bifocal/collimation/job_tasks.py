@@ -22,8 +22,7 @@ from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.stated_media import lacking, media_as_dict, media_of
 from bifocal.collimation.wording import say, without_options
 from bifocal.options import OF_PAIR
-from bifocal.orientation.align_workflow import KnownLens
-from bifocal.orientation.control_points import Control
+from bifocal.orientation import Control, KnownLens
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.jsonfile import plain

@@ -9,17 +9,20 @@ import numpy as np
 from bifocal.collimation.records import PickedControl, SurveyState
 from bifocal.collimation.stated_media import lacking, media_of
 from bifocal.collimation.wording import say, without_options
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.orientation_precision import rates_of
-from bifocal.model.pair import Pair
-from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.adjustment.observed_points import views_of
-from bifocal.orientation.adjustment.pair_observations import at
-from bifocal.orientation.align_workflow import KnownLens, interior_of_photo
-from bifocal.orientation.alignment import standard_deviations
-from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
-from bifocal.orientation.tuning import CONTROL
+from bifocal.model import Interior, Pair, rates_of
+from bifocal.orientation import (
+    CONTROL,
+    Control,
+    KnownLens,
+    OrientedPair,
+    PhotoInput,
+    SiteMeasures,
+    at,
+    interior_of_photo,
+    orient_pair,
+    standard_deviations,
+    views_of,
+)
 from photocore.arrays import FloatArray
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo

@@ -9,12 +9,8 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.records import PickedPoint, Picks
-from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.point_survey import solve_points
-from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.setup import SurveySetup
+from bifocal.model import FlagLimits, Pair
+from bifocal.survey import PointObservations, ReliefTable, SurveySetup, solve_points
 from photocore.arrays import FloatArray
 from photocore.jsonfile import plain
 

@@ -8,10 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from bifocal.collimation.records import Known, Pasted, Picks, Pixel
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.model.world_frame import WorldFrame
-from bifocal.orientation.control_lists import NoFrontError, in_plane_frame, without_unseen
-from bifocal.orientation.control_points import COLUMNS, metres_of
+from bifocal.model import FARTHEST_WALL, WorldFrame
+from bifocal.orientation import COLUMNS, NoFrontError, in_plane_frame, metres_of, without_unseen
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.tables import read_table

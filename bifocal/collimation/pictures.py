@@ -12,13 +12,9 @@ from bifocal.collimation.fields import FieldError
 from bifocal.collimation.pyramids import Pyramid, RectifiedPhoto, wall_grid
 from bifocal.collimation.records import Change, Picks, Pixel
 from bifocal.collimation.tile_store import TileStore
-from bifocal.files.strips import colour_strips
-from bifocal.matching.snapping import snap
-from bifocal.matching.suggestions import radial_line, suggest
-from bifocal.model.geotiff import RasterReader
-from bifocal.model.grid import Grid
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.files import colour_strips
+from bifocal.matching import radial_line, snap, suggest
+from bifocal.model import Grid, Pair, Photo, RasterReader
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError

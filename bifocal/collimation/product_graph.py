@@ -14,8 +14,8 @@ from typing import Any
 from bifocal.collimation.proposals import Report
 from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.survey_on_page import SurveyOnPage
-from bifocal.faces.faces_files import beside
-from bifocal.files.made_from import MadeFrom, photos_of
+from bifocal.faces import beside
+from bifocal.files import MadeFrom, photos_of
 from photocore.errors import PhotogrammetryError
 from photocore.jsonfile import plain
 from photocore.provenance import digest_of, known_hash

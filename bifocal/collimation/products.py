@@ -11,13 +11,10 @@ import cv2
 import numpy as np
 
 from bifocal.collimation.project import SurveyFiles
-from bifocal.model.geotiff import RasterReader
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import TOLD, ReliefMap
-from bifocal.model.surface import MapSurface
-from bifocal.orthophotos.shading import shaded, tints
+from bifocal.model import TOLD, Grid, MapSurface, RasterReader, ReliefMap
+from bifocal.orthophotos import shaded, tints
 from bifocal.remarks import remark
-from bifocal.reports.content import ortho_thumbnail
+from bifocal.reports import ortho_thumbnail
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.output import free_path

@@ -12,17 +12,15 @@ from typing import Any
 import numpy as np
 
 from bifocal.collimation.fields import NOTES, FieldError, fields_of
-from bifocal.files.photos import photo_infos
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.files import photo_infos
+from bifocal.model import Pair, PhotoSet, pair_or_set
 from bifocal.remarks import remark
-from bifocal.survey.set_survey import best_pair
-from bifocal.workbook.pair_workflow import is_survey, read_pair
-from bifocal.workbook.reading.reader import read_survey
+from bifocal.survey import best_pair
+from bifocal.workbook import is_survey, read_pair, read_survey
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.images import READ, image_info
 from photocore.textfile import file_name
-from photocore.workbook.reading.package import open_package
+from photocore.workbook import open_package
 
 #: Endings of photos looked for in a folder.
 PHOTOS = READ

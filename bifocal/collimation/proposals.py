@@ -11,11 +11,8 @@ import cv2
 import numpy as np
 
 from bifocal.collimation.records import GIVES_SCALE, SurveyState
-from bifocal.model.diagnostics import ControlResidual
-from bifocal.model.doubts import RIVALS, doubts_of
-from bifocal.model.pair import Pair
-from bifocal.orientation.control_points import SiteMeasures
-from bifocal.orientation.rescaling import scaled_by_distance, scaled_by_length
+from bifocal.model import RIVALS, ControlResidual, Pair, doubts_of
+from bifocal.orientation import SiteMeasures, scaled_by_distance, scaled_by_length
 from photocore.arrays import BoolArray, Float32Array, FloatArray
 from photocore.jsonfile import read_object, write_object
 

@@ -10,10 +10,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from bifocal.model.grid import Bounds, Grid
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.orthophotos.rectify import LensTable, SourcePhoto, footprint
+from bifocal.model import Bounds, Grid, Pair, Photo
+from bifocal.orthophotos import LensTable, SourcePhoto, footprint
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.errors import GeometryError
 from photocore.images import ImageArray, to_eight_bit

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from bifocal.model.world_frame import WorldFrame
-from bifocal.survey.observations import DOUBT_CODES, PLANE_CODES
+from bifocal.model import WorldFrame
+from bifocal.survey import DOUBT_CODES, PLANE_CODES
 
 #: A pick: column and row in the photo as taken. [px]
 Pixel = tuple[float, float]

@@ -36,11 +36,9 @@ from bifocal.collimation.shapes import outlines_of
 from bifocal.collimation.workbook.rows import PointRow, put_rows, row_of
 from bifocal.collimation.workbook.setup import ideal_setup, pair_of, typed_of
 from bifocal.collimation.workbook.sync import WorkbookSync
-from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import FlagLimits, Pair, PhotoSet
 from bifocal.remarks import remark
-from bifocal.survey.wall_precision import WallPrecision
+from bifocal.survey import WallPrecision
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import plain
 from photocore.output import relative_name

@@ -14,10 +14,8 @@ import numpy as np
 
 from bifocal import rays
 from bifocal.collimation.records import DrawnShape, SurveyState
-from bifocal.faces.faces import BreakLine, Face, Faces, Occluder
-from bifocal.faces.faces_files import beside
-from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap
+from bifocal.faces import BreakLine, Face, Faces, Occluder, beside
+from bifocal.model import Pair, ReliefMap
 from photocore.arrays import FloatArray
 
 #: Rounds in which relief and place settle where a ray meets a relief map.

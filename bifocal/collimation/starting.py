@@ -15,11 +15,12 @@ from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.session import Session
 from bifocal.collimation.wording import without_options
 from bifocal.demo import SAMPLE
-from bifocal.files.photos import photo_infos
-from bifocal.model.doubts import NO_UNIT, unit_of
-from bifocal.projects.photos_workflow import ProjectOptions, photos_from_project, project_walls
+from bifocal.files import photo_infos
+from bifocal.model import NO_UNIT
+from bifocal.model.doubts import unit_of
+from bifocal.projects import ProjectOptions, photos_from_project, project_walls
 from bifocal.remarks import remark
-from bifocal.survey.set_survey import best_pair
+from bifocal.survey import best_pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import Pair, PairMedia
 from multimedia import Layers
 
 #: Fields of the set-up that say what lies between the cameras and the wall: indices of refraction,

@@ -11,7 +11,7 @@ from bifocal.collimation.products import Products
 from bifocal.collimation.project import SurveyFiles
 from bifocal.collimation.proposals import Proposal, Report
 from bifocal.collimation.records import SurveyState
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 
 
 class SurveyOnPage(Protocol):

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal.comparison.tuning import CHANGE
-from bifocal.model.grid import Grid
-from bifocal.model.relief_map import Quality, ReliefMap
+from bifocal.model import Grid, Quality, ReliefMap
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import LARGEST, InputError

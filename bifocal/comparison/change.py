@@ -20,7 +20,7 @@ from bifocal.comparison.cells import (
 from bifocal.comparison.chance import Chance, Patches, chance
 from bifocal.comparison.photo_evidence import PhotosOfDate, contradicted, parallax_of
 from bifocal.comparison.tuning import CHANGE
-from bifocal.model.relief_map import ReliefMap
+from bifocal.model import ReliefMap
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray, positive
 from photocore.errors import InputError

@@ -13,7 +13,7 @@ from bifocal.comparison.change import Comparison
 from bifocal.remarks import in_language
 from bifocal.reports import figures
 from photocore.provenance import provenance
-from photocore.reports.document import (
+from photocore.reports import (
     Banner,
     Block,
     Document,
@@ -21,9 +21,10 @@ from photocore.reports.document import (
     Paragraph,
     Picture,
     TextTable,
+    Words,
+    dated_document,
+    words_of,
 )
-from photocore.reports.framing import dated_document
-from photocore.reports.words import Words, words_of
 from photocore.textfile import packaged
 
 #: Pixels along a side of the map in the report.

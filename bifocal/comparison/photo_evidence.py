@@ -9,13 +9,8 @@ import numpy as np
 
 from bifocal.comparison.cells import on_grid
 from bifocal.comparison.tuning import EVIDENCE
-from bifocal.files.made_from import PAIR_TAG, MadeFrom, check_maps
-from bifocal.model.geotiff import RasterReader
-from bifocal.model.image import as_grey
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.relief_map import ReliefMap
+from bifocal.files import PAIR_TAG, MadeFrom, check_maps
+from bifocal.model import Pair, Photo, PhotoSet, RasterReader, ReliefMap, as_grey
 from bifocal.relief_maps.photo_evidence import Witness, exposed_alike, misfit, shown_by
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError

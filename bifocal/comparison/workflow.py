@@ -13,18 +13,17 @@ import numpy as np
 from bifocal.comparison.change import ChangedRegion, Comparison, compare
 from bifocal.comparison.change_report import change_document
 from bifocal.comparison.photo_evidence import holds_photos, photos_at_hand
-from bifocal.files.dxf import add_text, new_drawing, save_drawing
-from bifocal.model.geotiff import create_raster
-from bifocal.model.relief_map import ReliefMap
+from bifocal.files import add_text, new_drawing, save_drawing
+from bifocal.model import ReliefMap, create_raster
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray, as_floats
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import atomic_folder, atomic_path
-from photocore.reports.writing import write_document
+from photocore.reports import write_document
 from photocore.tables import write_csv
-from photocore.workbook.making.newbook import plain_cell, save_book
+from photocore.workbook import plain_cell, save_book
 
 #: Bands of the difference.
 BANDS = ("difference [m]", "sigma [m]", "region (0 no change proven, -1 another surface seen)")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bifocal.demo import SAMPLE, WATER_SAMPLE
-from bifocal.model.grid import Bounds
+from bifocal.model import Bounds
 
 #: Precision of the samples' picks, those of a careful hand. [px]
 PICK_SIGMA = 0.2

@@ -13,16 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.demo.samples import FACADE, PICK_SIGMA, Sample
-from bifocal.files.strips import write_png
-from bifocal.model.geotiff import RasterReader, dpi_at_scale
-from bifocal.model.pair import Pair
-from bifocal.model.relief_map import ReliefMap
-from bifocal.orthophotos.ortho_workflow import OrthoTask, make_ortho
+from bifocal.files import write_png
+from bifocal.model import Pair, RasterReader, ReliefMap, dpi_at_scale
+from bifocal.orthophotos import OrthoTask, make_ortho
 from bifocal.relief_maps.workflow import ReliefJob, relief_of_pair
 from bifocal.remarks import remark
-from bifocal.survey.setup import Measuring
-from bifocal.workbook.output import write_result
-from bifocal.workbook.workflow import solve
+from bifocal.survey import Measuring
+from bifocal.workbook import solve, write_result
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError

@@ -4,3 +4,7 @@
 `faced_surface` is relief that obeys all of them. `suggestions` proposes faces where relief was
 not measured. `tuning` keeps the numbers.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

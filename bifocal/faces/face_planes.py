@@ -8,8 +8,7 @@ import numpy as np
 
 from bifocal.faces.faces import Face, inside
 from bifocal.faces.tuning import PLANES
-from bifocal.model.grid import Grid, bounds_of
-from bifocal.model.surface import Surface
+from bifocal.model import Grid, Surface, bounds_of
 from bifocal.remarks import remark
 from photocore.arrays import Float32Array, FloatArray
 from photocore.errors import InputError

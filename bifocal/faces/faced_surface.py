@@ -12,9 +12,16 @@ import numpy as np
 from bifocal.faces.face_planes import placed
 from bifocal.faces.faces import BreakLine, Faces, Occluder, inside
 from bifocal.faces.tuning import EDGES
-from bifocal.model.grid import Bounds, Grid, bounds_of
-from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.model.surface import MapSurface, Surface, measured_on
+from bifocal.model import (
+    Bounds,
+    Grid,
+    MapSurface,
+    Quality,
+    ReliefMap,
+    Surface,
+    bounds_of,
+    measured_on,
+)
 from bifocal.rays import Foot
 from photocore.arrays import BoolArray, Float32Array, FloatArray, IntArray
 

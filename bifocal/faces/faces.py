@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bifocal.model.grid import Grid
+from bifocal.model import Grid
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_floats, positive
 from photocore.errors import LARGEST, InputError, located

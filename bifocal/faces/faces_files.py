@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from bifocal.faces.faces import BreakLine, Face, Faces, Occluder
-from bifocal.files.pair_names import without_ending
-from bifocal.model.photo import Photo
+from bifocal.files import without_ending
+from bifocal.model import Photo
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError

@@ -10,10 +10,7 @@ import numpy as np
 from bifocal.faces.face_planes import robust_plane
 from bifocal.faces.faces import Face, Faces
 from bifocal.faces.tuning import SUGGESTIONS
-from bifocal.model.grid import Grid
-from bifocal.model.image import as_grey
-from bifocal.model.photo import Photo
-from bifocal.model.relief_map import TOLD, Quality, ReliefMap
+from bifocal.model import TOLD, Grid, Photo, Quality, ReliefMap, as_grey
 from photocore.arrays import BoolArray, ByteArray, Float32Array
 from photocore.large_photos import Pixels
 

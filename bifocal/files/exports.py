@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bifocal.files.dxf import add_ellipse, add_text, layer_name, new_drawing, save_drawing
-from bifocal.model.points import PointLine, Points
+from bifocal.model import PointLine, Points
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, not_negative
-from photocore.camera.similarity import Similarity, fit_similarity
+from photocore.camera import Similarity, fit_similarity
 from photocore.cloud import write_cloud
 from photocore.errors import GeometryError, InputError
 from photocore.output import atomic_path
 from photocore.tables import write_csv
 from photocore.tables.csvwrite import Columns
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.newbook import finish_book, new_workbook, plain_cell
+from photocore.workbook import CellValue, finish_book, new_workbook, plain_cell
 
 if TYPE_CHECKING:
     from openpyxl import Workbook

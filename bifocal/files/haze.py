@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.image import as_grey, as_photo, local_contrast, noise
-from bifocal.model.pair import Pair
+from bifocal.model import Pair, as_grey, as_photo, local_contrast, noise
 from photocore.arrays import ByteArray, Float32Array
 from photocore.images import read_grey, read_image
 from photocore.large_photos import Pixels

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bifocal.model.geotiff import RasterReader
-from bifocal.model.photo import Photo
+from bifocal.model import Photo, RasterReader
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.jsonfile import to_text

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet, pair_or_set
+from bifocal.model import Pair, PhotoSet, pair_or_set
 
 #: What is no part of the name of a pair's file.
 _ENDINGS = (".pair.json", ".photos.json", ".json", ".xlsx", ".xlsm")

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import Pair, Photo, PhotoSet
 from photocore.images import ImageInfo, image_info
 
 

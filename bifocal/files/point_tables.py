@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.points import Points
+from bifocal.model import Points
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.convert import NOT_CALCULATED
-from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook import SheetFile
 
 _COLUMNS = (
     Column("id", aliases=("Point", "Punto", "Punkt", "Name"), kind="text", required=True),

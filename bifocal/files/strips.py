@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.geotiff import METRES_PER_INCH, RasterReader
+from bifocal.model import METRES_PER_INCH, RasterReader
 from photocore.arrays import ByteArray
 from photocore.output import atomic_path
 from photocore.png_text import SIGNATURE, chunk, provenance_chunk

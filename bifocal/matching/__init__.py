@@ -7,3 +7,7 @@ other photos of a set. For a person who picks: `corners` and `snapping` centre a
 `suggestions` offer its partner, `pick_evidence` holds picks against the photos. `tuning` keeps
 the numbers of all of them.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.files.haze import greys_of_pair
+from bifocal.files import greys_of_pair
 from bifocal.matching.matches import Matches
 from bifocal.matching.matching import MatchSettings, match_pair
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 
 
 def match(

@@ -25,11 +25,7 @@ from bifocal.matching.matches import Matches
 from bifocal.matching.patches import PatchResult, refine, same_scale
 from bifocal.matching.targets import SurveyTargets, find_targets
 from bifocal.matching.tuning import FEATURES, MATCH
-from bifocal.model.flags import FlagLimits
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Images
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model import FlagLimits, Images, Pair, Photo, apply_homography
 from bifocal.rays import point_on_ray, relief_of_rays, zoom_factor
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma

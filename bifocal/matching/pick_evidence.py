@@ -11,9 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.model.homography import apply_homography
-from bifocal.model.hypotheses import Picks, PickSlip, picks_meant
-from bifocal.model.interior_orientation import Images
+from bifocal.model import Images, Picks, PickSlip, apply_homography, picks_meant
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 

@@ -11,8 +11,7 @@ import numpy as np
 from bifocal.matching.matching import MatchSettings, match_pair, precision, raw_metres
 from bifocal.matching.patches import refine, same_scale
 from bifocal.matching.tuning import MATCH
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.set_intersection import SetIntersection
+from bifocal.model import PhotoSet, SetIntersection
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import GeometryError

@@ -11,7 +11,7 @@ import numpy as np
 from bifocal.matching.matching import directions_at, local_zoom, seen_at
 from bifocal.matching.patches import PatchResult, refine, same_scale
 from bifocal.matching.tuning import MATCH, SUGGESTIONS
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 from bifocal.rays import point_on_ray, relief_from_zoom, zoom_factor
 from photocore.arrays import ByteArray, Float32Array, FloatArray
 from photocore.errors import InputError

@@ -9,8 +9,7 @@ import numpy as np
 from bifocal.model.lens import SIGMA_FOCAL, Lens
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray, is_finite_number, positive
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole, camera_matrix
+from photocore.camera import Pinhole, RadialDivision, camera_matrix
 from photocore.errors import InputError, located
 
 #: Standard deviation of a principal point, as shares of the diagonal: of a calibrated lens (focus,

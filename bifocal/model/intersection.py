@@ -13,7 +13,7 @@ from bifocal import rays
 from bifocal.model.flags import FlagLimits, point_flags
 from bifocal.model.points import Points
 from photocore.arrays import FloatArray
-from photocore.camera.distortion import inverse_2x2
+from photocore.camera import inverse_2x2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray, as_floats, as_points, not_negative, read_only
-from photocore.camera.lensformats import read_foreign_lens
+from photocore.camera import read_foreign_lens
 from photocore.errors import InputError, located
 from photocore.jsonfile import read_object, write_object
 

@@ -14,7 +14,7 @@ import numpy as np
 from bifocal.media import PLACING, MediaPath, PointViews, view
 from multimedia import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
-from photocore.camera.pinhole import PARAMETERS, Pinhole, camera_matrix
+from photocore.camera import PARAMETERS, Pinhole, camera_matrix
 from photocore.errors import InputError
 
 #: What each camera's covariance counts: a pinhole's parameters and two terms of radial distortion.

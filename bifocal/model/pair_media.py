@@ -30,8 +30,14 @@ from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, typical_sigma
 from photocore.arrays import FloatArray, not_negative, positive
-from photocore.camera.pinhole import PARAMETERS, Pinhole, ProjectedPoints, ray_on_plane, triangulate
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera import (
+    PARAMETERS,
+    Pinhole,
+    ProjectedPoints,
+    ray_on_plane,
+    rotation_from_vector,
+    triangulate,
+)
 from photocore.errors import GeometryError, InputError
 
 #: Normal of one camera's interfaces: a direction in the plane frame, square to the optical axis, or

@@ -20,7 +20,7 @@ from bifocal.model.orientation_precision import pinhole
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points, not_negative, positive, read_only
-from photocore.camera.distortion import inverse_2x2
+from photocore.camera import inverse_2x2
 from photocore.errors import GeometryError, InputError, located
 from photocore.jsonfile import plain
 from photocore.names import on_disk

@@ -14,7 +14,7 @@ from bifocal.model.intersection import Intersection, MeasuredPoints, PlanePicks,
 from bifocal.model.orientation_precision import independent, pixel_rates
 from bifocal.model.photo import Photo
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.distortion import inverse_2x2
+from photocore.camera import inverse_2x2
 
 #: The third correction of a point is below 1e-9 of the first.
 _ITERATIONS = 4

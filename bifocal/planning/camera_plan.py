@@ -7,12 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bifocal.model.basis import rests_on
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia, stated_by_photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import Pair, PairMedia, PhotoSet, rests_on, stated_by_photo
 from photocore.arrays import FloatArray, positive
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import Pinhole
 from photocore.errors import InputError
 
 #: Of the frame of 36 x 24 mm, by which makers state equivalents. [mm]

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from bifocal.media import media_words
 from bifocal.remarks import in_language
-from photocore.reports.words import Words, texts_of, words_of
-from photocore.workbook.making.live_columns import row_formula
-from photocore.workbook.making.look import INPUT_EDGE, INPUT_FILL
-from photocore.workbook.making.newbook import finish_book, new_workbook
+from photocore.reports import Words, texts_of, words_of
+from photocore.workbook import INPUT_EDGE, INPUT_FILL, finish_book, new_workbook, row_formula
 
 if TYPE_CHECKING:
     from bifocal.planning.camera_plan import Plan

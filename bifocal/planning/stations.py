@@ -9,8 +9,7 @@ from math import ceil, hypot, sqrt
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import Pair, PairMedia
 from bifocal.planning.camera_plan import CameraSensor, Plan, Station, planned_pair, sigma_at
 from bifocal.precision import base_factor, uncertainty_radius
 from bifocal.remarks import remark

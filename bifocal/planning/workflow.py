@@ -11,7 +11,7 @@ from bifocal.planning.camera_plan import CameraSensor, Plan
 from bifocal.planning.plan_workbook import write_plan
 from bifocal.planning.stations import plan_stations
 from photocore.output import check_ending
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 
 def make_plan(

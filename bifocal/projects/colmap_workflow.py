@@ -6,15 +6,13 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from bifocal.model.orientation_precision import pinhole
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import Photo, PhotoSet, pinhole
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError, located
 from photocore.images import image_info
 from photocore.output import check_not_input
-from photocore.programs.colmap import camera_words, image_words, write_colmap_model
+from photocore.programs import camera_words, image_words, write_colmap_model
 
 #: Camera matrices of homography and lens that differ by no more are one. [px]
 SAME, SKEWED = 1e-3, 1e-2

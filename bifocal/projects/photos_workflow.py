@@ -9,12 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from bifocal.model.doubts import NO_UNIT
-from bifocal.model.interior_orientation import TURNS, lens_of_photo
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import NO_UNIT, TURNS, Lens, Pair, Photo, PhotoSet, lens_of_photo
 from bifocal.projects.project_points import chosen, read_points, sparse_points
 from bifocal.projects.scale import by_control, of_cameras
 from bifocal.projects.wall_frame import (
@@ -27,15 +22,11 @@ from bifocal.projects.wall_frame import (
 from bifocal.projects.wall_pictures import squared, write_wall_pictures
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera.lensdata import LensData
-from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
-from photocore.camera.similarity import Similarity
+from photocore.camera import LensData, Pinhole, Similarity, plane_from_pixel, project
 from photocore.errors import InputError
 from photocore.images import image_info
 from photocore.output import all_or_none, check_not_input, check_writable, relative_name
-from photocore.programs.model import ForeignProject, ForeignView
-from photocore.programs.photos import PhotoFinder
-from photocore.programs.projects import read_foreign_project
+from photocore.programs import ForeignProject, ForeignView, PhotoFinder, read_foreign_project
 
 #: Length of a unit that a project may be in. [m]
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}

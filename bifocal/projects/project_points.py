@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.lens import Lens
+from bifocal.model import Lens
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole, rays_meeting
+from photocore.camera import Pinhole, rays_meeting
 from photocore.cloud import open_cloud
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import called, meant, nearest
-from photocore.programs.model import ForeignProject, ForeignView
+from photocore.programs import ForeignProject, ForeignView
 from photocore.tables import Column, Table, read_table
 from photocore.tables.axes import COLUMNS_OF_PIXELS, NAMES, PHOTOS, ROWS_OF_PIXELS
 

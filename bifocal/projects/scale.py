@@ -7,17 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.orientation_precision import CAMERA
-from bifocal.orientation.control_lists import in_plane_frame
-from bifocal.orientation.control_points import COLUMNS, metres_of
+from bifocal.model import CAMERA
+from bifocal.orientation import COLUMNS, in_plane_frame, metres_of
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import project
-from photocore.camera.rotation import skew
-from photocore.camera.similarity import Similarity, fit_similarity
+from photocore.camera import Similarity, fit_similarity, project, skew
 from photocore.errors import CellError, InputError, WorkbookError
 from photocore.names import meant
-from photocore.programs.model import ForeignView
+from photocore.programs import ForeignView
 from photocore.provenance import note_remark
 from photocore.tables import read_table
 

@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.lens import Lens
-from bifocal.orientation.facade_lines import facade_rotation
-from bifocal.orientation.tuning import LINES, WALLS
-from bifocal.orientation.walls.reference_plane import largest_plane
-from bifocal.orientation.walls.wall_planes import planes_of_any_direction
+from bifocal.model import Interior, Lens
+from bifocal.orientation import (
+    LINES,
+    WALLS,
+    facade_rotation,
+    largest_plane,
+    planes_of_any_direction,
+)
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole
-from photocore.camera.rotation import rotation_from_vector
-from photocore.camera.similarity import Similarity
+from photocore.camera import Pinhole, Similarity, rotation_from_vector
 from photocore.errors import GeometryError, InputError
 from photocore.images import read_grey
-from photocore.programs.model import ForeignProject, ForeignView
+from photocore.programs import ForeignProject, ForeignView
 
 #: A façade leans by no more against the upright: sine of the angle. What is flatter is ground.
 UPRIGHT = 0.5

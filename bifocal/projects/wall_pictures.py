@@ -8,13 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from bifocal.model.lens import Lens
-from bifocal.orientation.area_points import resampled
+from bifocal.model import Lens
+from bifocal.orientation import resampled
 from bifocal.projects.wall_frame import ProjectWall
 from photocore.arrays import BoolArray, ByteArray
-from photocore.camera.pinhole import project
+from photocore.camera import project
 from photocore.images import read_grey, write_image
-from photocore.programs.model import ForeignView
+from photocore.programs import ForeignView
 
 #: Longer side of a wall's picture, and the height of its line. [px]
 SIDE, LINE = 800, 40

@@ -6,17 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bifocal.model.doubts import MISFITS, doubts_of
-from bifocal.model.length_checks import LengthCheck, agreement, checks_of
-from bifocal.model.pair import Pair
-from bifocal.model.photos_of_set import PhotosOfSet
+from bifocal.model import MISFITS, LengthCheck, Pair, PhotosOfSet, agreement, checks_of, doubts_of
 from bifocal.remarks import in_language
 from bifocal.reports.content import PairContent
-from bifocal.survey.reference import CheckResult
-from bifocal.survey.tolerances import SCALES, judge
-from bifocal.survey.wall_precision import WallPrecision, wall_precision
-from photocore.reports.document import Banner, Block, Paragraph, TextTable
-from photocore.reports.words import Words, words_of
+from bifocal.survey import SCALES, CheckResult, WallPrecision, judge
+from bifocal.survey.wall_precision import wall_precision
+from photocore.reports import Banner, Block, Paragraph, TextTable, Words, words_of
 
 #: What is judged by itself: the plan of a drawing, and what stands out of it.
 _PARTS = {"part_drawing": "XY", "part_relief": "Z"}

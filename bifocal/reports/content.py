@@ -12,29 +12,30 @@ from typing import Any, ClassVar, Protocol, cast
 import cv2
 import numpy as np
 
-from bifocal.files.made_from import MadeFrom, check_maps, photos_of
-from bifocal.files.photos import photo_infos
-from bifocal.files.strips import ROWS, colour_strips
-from bifocal.model.diagnostics import Diagnostics
-from bifocal.model.doubts import check_scale
-from bifocal.model.geotiff import RasterReader
-from bifocal.model.grid import Bounds
-from bifocal.model.length_checks import LengthCheck
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet, pair_or_set
-from bifocal.model.relief_map import Quality, ReliefMap
-from bifocal.model.surface import MapSurface
+from bifocal.files import ROWS, MadeFrom, check_maps, colour_strips, photo_infos, photos_of
+from bifocal.model import (
+    Bounds,
+    Diagnostics,
+    LengthCheck,
+    MapSurface,
+    Pair,
+    Photo,
+    PhotoSet,
+    Quality,
+    RasterReader,
+    ReliefMap,
+    check_scale,
+    pair_or_set,
+)
 from bifocal.options import defaults_of, typed
 from bifocal.remarks import remark
 from bifocal.reports.control_survey import is_exchanged, solve_control
-from bifocal.survey.set_survey import best_pair
-from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.workbook.workflow import solve
+from bifocal.survey import SolvedSurvey, best_pair
+from bifocal.workbook import solve
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError, located
 from photocore.images import read_image, to_eight_bit
-from photocore.reports.words import Words
+from photocore.reports import Words
 
 #: Longer side of pictures in a report. [px]
 SIDE = 1000

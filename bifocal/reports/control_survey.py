@@ -11,15 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet, pair_or_set
-from bifocal.model.world_frame import WorldFrame
-from bifocal.orientation.control_points import Control, read_control
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.survey_input import SurveyInput
-from bifocal.workbook.workflow import solve
+from bifocal.model import Pair, PhotoSet, WorldFrame, pair_or_set
+from bifocal.orientation import Control, read_control
+from bifocal.survey import KnownPoints, PointObservations, SolvedSurvey, SurveyInput
+from bifocal.workbook import solve
 from photocore.errors import InputError
 
 #: Code of points that the orientation rests on, and of independent ones.

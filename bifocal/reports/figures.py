@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.grid import Bounds
-from bifocal.model.photo import Photo
-from bifocal.model.relief_map import TOLD, Quality, ReliefMap
+from bifocal.model import TOLD, Bounds, Photo, Quality, ReliefMap
 from bifocal.reports.content import SIDE, PairContent, ReportedPhoto
 from photocore.arrays import FloatArray
-from photocore.reports.words import Words
+from photocore.reports import Words
 from photocore.textfile import packaged
 
 #: Place of the axes in a figure, with and without room for a colour bar; of the bar.

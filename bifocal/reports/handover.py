@@ -14,15 +14,9 @@ from typing import Any, TypedDict
 import cv2
 import numpy as np
 
-from bifocal.files.made_from import MadeFrom, check_maps, photos_of
-from bifocal.files.photos import photo_info
-from bifocal.files.point_tables import read_survey_points
-from bifocal.model.grid import Bounds, Grid
-from bifocal.model.pair import Pair
-from bifocal.model.points import Points
-from bifocal.model.relief_map import ReliefMap
-from bifocal.model.surface import MapSurface
-from bifocal.orthophotos.shading import colour_limits, shaded
+from bifocal.files import MadeFrom, check_maps, photo_info, photos_of, read_survey_points
+from bifocal.model import Bounds, Grid, MapSurface, Pair, Points, ReliefMap
+from bifocal.orthophotos import colour_limits, shaded
 from bifocal.remarks import remark
 from bifocal.reports.content import ortho_thumbnail
 from photocore.arrays import ByteArray
@@ -31,8 +25,7 @@ from photocore.images import read_image, to_eight_bit
 from photocore.jsonfile import plain
 from photocore.output import atomic_path, check_ending, check_writable
 from photocore.provenance import program, today
-from photocore.reports.html_page import provenance_text
-from photocore.reports.words import words_of
+from photocore.reports import provenance_text, words_of
 
 #: What goes by mail: the file is never larger. [bytes]
 MOST = 24_000_000

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.orientation_precision import CAMERA, pinhole
-from bifocal.model.photo import Photo
+from bifocal.model import CAMERA, Photo, pinhole
 from bifocal.reports.content import PairContent
 from photocore.arrays import FloatArray
-from photocore.reports.document import Block, Heading, Paragraph, Picture, TextTable
-from photocore.reports.words import Words
+from photocore.reports import Block, Heading, Paragraph, Picture, TextTable, Words
 
 #: What belongs to the lens, of `CAMERA`, with its sign in tables.
 _LENS = {

@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.media import media_words
-from bifocal.model.diagnostics import ControlResidual
-from bifocal.model.doubts import MISFITS, doubts_of, untold
-from bifocal.model.orientation_precision import pinhole
-from bifocal.model.photo import Photo
-from bifocal.model.relief_map import TOLD, Quality, ReliefMap
+from bifocal.model import (
+    MISFITS,
+    TOLD,
+    ControlResidual,
+    Photo,
+    Quality,
+    ReliefMap,
+    doubts_of,
+    pinhole,
+    untold,
+)
 from bifocal.remarks import in_language
 from bifocal.reports import figures
 from bifocal.reports.accuracy import accuracy_blocks, millimetres
@@ -22,12 +28,20 @@ from bifocal.reports.lens_section import lens_blocks
 from bifocal.reports.project_section import camera_rows, processing_blocks, project_blocks
 from bifocal.reports.refraction import refraction_blocks
 from bifocal.reports.worked_point import method_blocks
-from bifocal.survey.remarks import refraction_remarks
-from bifocal.survey.tolerances import RULES
-from photocore.camera.rotation import angles_from_rotation
-from photocore.reports.document import Block, Document, Heading, Paragraph, Picture, TextTable
-from photocore.reports.framing import dated_document, provenance_blocks
-from photocore.reports.words import Words, words_of
+from bifocal.survey import RULES, refraction_remarks
+from photocore.camera import angles_from_rotation
+from photocore.reports import (
+    Block,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    TextTable,
+    Words,
+    dated_document,
+    provenance_blocks,
+    words_of,
+)
 
 #: Relief less precise than this is drawn as the area of uncertainty where no scale was asked for;
 #: else what a line of 0.18 mm covers at that scale. [m]

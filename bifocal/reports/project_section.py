@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bifocal.files.photos import photo_infos
+from bifocal.files import photo_infos
 from bifocal.options import PROJECT
 from bifocal.reports.content import PairContent
-from photocore.reports.document import Block, Heading, Paragraph, TextTable
-from photocore.reports.words import Words
+from photocore.reports import Block, Heading, Paragraph, TextTable, Words
 
 
 def project_blocks(content: PairContent, say: Words) -> Iterator[Block]:

@@ -8,10 +8,9 @@ import numpy as np
 
 from bifocal.reports.accuracy import millimetres
 from bifocal.reports.content import PairContent
-from bifocal.survey.remarks import refraction_errors
+from bifocal.survey import refraction_errors
 from photocore.arrays import FloatArray
-from photocore.reports.document import Block, Paragraph
-from photocore.reports.words import Words
+from photocore.reports import Block, Paragraph, Words
 
 #: Places looked at across and along the near photo.
 _GRID = 15

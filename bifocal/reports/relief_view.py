@@ -11,13 +11,11 @@ from string import Template
 
 import numpy as np
 
-from bifocal.model.grid import Bounds
-from bifocal.model.relief_map import ReliefMap
+from bifocal.model import Bounds, ReliefMap
 from photocore.arrays import ByteArray, Float32Array
 from photocore.errors import InputError
 from photocore.provenance import program, today
-from photocore.reports.html_page import provenance_text
-from photocore.reports.words import words_of
+from photocore.reports import provenance_text, words_of
 
 #: Points of the mesh: what 16-bit indices reach, in every browser.
 _MOST = 65_000

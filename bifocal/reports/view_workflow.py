@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifocal.model.relief_map import ReliefMap
+from bifocal.model import ReliefMap
 from bifocal.reports.content import ortho_thumbnail
 from bifocal.reports.relief_view import relief_view
 from photocore.output import atomic_path, check_ending, check_writable

@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal.media import media_words
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model import Pair, Photo
 from bifocal.rays import object_rays
 from bifocal.reports.accuracy import millimetres
 from bifocal.reports.content import PairContent
 from photocore.arrays import FloatArray
-from photocore.reports.document import Block, Heading, Paragraph
-from photocore.reports.words import Words
+from photocore.reports import Block, Heading, Paragraph, Words
 
 _NUMBER = r"(-?\d+\.\d+)"
 #: The two pixels of a method page, and what is found of them; the same in every language.

@@ -16,7 +16,7 @@ from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_writable
-from photocore.reports.writing import check_report, write_document
+from photocore.reports import check_report, write_document
 
 #: How the files of pairs and of sets end.
 _ENDINGS = re.compile(r"\.(pair|photos)\.json$")

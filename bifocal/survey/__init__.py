@@ -9,3 +9,7 @@ its columns are prepared by `radii`, `refracted_radii` and `image_shift`. More t
 worth by `transformation_precision`. Last the judgement: `check_points`, `taped`, `tolerances`,
 `wall_precision`, `basis`, `remarks`; `results` are its words.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

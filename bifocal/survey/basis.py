@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bifocal.model.basis import rests_on
+from bifocal.model import rests_on
 from bifocal.survey.solved_survey import SolvedSurvey
 
 

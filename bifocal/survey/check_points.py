@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.flags import UNCOUNTED
+from bifocal.model import UNCOUNTED
 from bifocal.survey.reference import AxisErrors, CheckResult, KnownPoints
 from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.tolerances import RULES, ToleranceRule, judge

@@ -13,13 +13,7 @@ from bifocal.survey.relief_table import ReliefTable
 from bifocal.survey.transformation_precision import TransformationPrecision, precision_of
 from bifocal.survey.weighted_similarity import WeightedFit, weighted_fit, weights_of
 from photocore.arrays import BoolArray, FloatArray, as_floats
-from photocore.camera.similarity import (
-    Similarity,
-    fit_levelled,
-    fit_plane,
-    fit_similarity,
-    round_origin,
-)
+from photocore.camera import Similarity, fit_levelled, fit_plane, fit_similarity, round_origin
 from photocore.errors import GeometryError, InputError
 
 #: Chance of calling an upright wall leaning.

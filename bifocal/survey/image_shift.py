@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.homography import apply_homography
-from bifocal.model.photo import Photo
+from bifocal.model import Photo, apply_homography
 from bifocal.rays import apparent_of_plane
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable

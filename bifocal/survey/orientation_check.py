@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bifocal import rays
-from bifocal.model.homography import apply_homography
-from bifocal.model.pair import Pair
+from bifocal.model import Pair, apply_homography
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bifocal.equations import relief
-from bifocal.model.flags import FlagLimits
+from bifocal.model import FlagLimits
 from bifocal.precision import sigma_relief
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.setup import OtherPhoto, SurveySetup

@@ -8,10 +8,15 @@ from typing import Any
 import numpy as np
 
 from bifocal.equations import plane_coordinates, relief, relief_displacement
-from bifocal.model.flags import DOUBTFUL_SHARE, FlagLimits, point_flags
-from bifocal.model.intersection import PlanePicks, intersect
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model import (
+    DOUBTFUL_SHARE,
+    FlagLimits,
+    Pair,
+    Photo,
+    PlanePicks,
+    intersect,
+    point_flags,
+)
 from bifocal.precision import point_covariance, sigma_relief
 from bifocal.rays import in_line, meeting_of, object_rays, zoom_centre
 from bifocal.survey.observations import PointObservations

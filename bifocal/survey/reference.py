@@ -8,12 +8,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bifocal.model.world_frame import WorldFrame
+from bifocal.model import WorldFrame
 from bifocal.remarks import remark
 from bifocal.survey.tolerances import Verdict
 from bifocal.survey.transformation_precision import TransformationPrecision
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats
-from photocore.camera.similarity import Similarity
+from photocore.camera import Similarity
 from photocore.errors import InputError
 from photocore.names import meant
 from photocore.series import check_index

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bifocal.media import MediaPath, ObjectRays
-from bifocal.model.photo import Photo
+from bifocal.model import Photo
 from bifocal.rays import seen_distance
 from bifocal.survey.radii import Radii, RefractedRays
 from photocore.arrays import FloatArray

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 from photocore.arrays import FloatArray, IntArray
 
 #: Entries of a symmetric matrix of X, Y, Z, and where they stand.

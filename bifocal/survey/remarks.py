@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifocal.model import Pair
 from bifocal.model.hypotheses import unit_of
-from bifocal.model.pair import Pair
 from bifocal.remarks import remark
 from bifocal.survey.georeferencing import georeference
 from bifocal.survey.observations import PointObservations

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.flags import FlagLimits
-from bifocal.model.intersection import displacement
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.set_intersection import SetIntersection
+from bifocal.model import FlagLimits, Pair, PhotoSet, SetIntersection, displacement
 from bifocal.rays import plane_position
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations

@@ -9,11 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.flags import SIGMA_PIXEL, FlagLimits
-from bifocal.model.homography import apply_homography
-from bifocal.model.hypotheses import SCALE_TOLERANCE
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
+from bifocal.model import SCALE_TOLERANCE, SIGMA_PIXEL, FlagLimits, Lens, Pair, apply_homography
 from bifocal.precision import false_relief_of_scale
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.points import Points
+from bifocal.model import Pair, PhotoSet, Points
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.orientation_check import OrientationCheck
 from bifocal.survey.reference import CheckResult, Georeference

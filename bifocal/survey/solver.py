@@ -7,12 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.model.flags import FlagLimits
-from bifocal.model.homography import apply_homography
-from bifocal.model.hypotheses import SCALE_TOLERANCE
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.world_frame import WorldFrame
+from bifocal.model import SCALE_TOLERANCE, FlagLimits, Pair, PhotoSet, WorldFrame, apply_homography
 from bifocal.remarks import remark
 from bifocal.survey.check_points import check_points
 from bifocal.survey.georeferencing import georeference

@@ -11,7 +11,7 @@ from bifocal.survey.reference import KnownPoints
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.taped import TapedDistance
 from photocore.tables import Table
-from photocore.workbook.reading.grid import SheetFile
+from photocore.workbook import SheetFile
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.model.lens import Lens
+from bifocal.model import Lens
 from photocore.arrays import FloatArray
 
 #: Turns of Newton in the workbook's formulas.

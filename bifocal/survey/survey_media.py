@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.media import MediaOfPhoto
-from bifocal.model.photo import Photo
+from bifocal.model import Photo
 from bifocal.remarks import remark
 from multimedia import Layers
 from photocore.errors import InputError

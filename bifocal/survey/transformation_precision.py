@@ -8,8 +8,7 @@ import numpy as np
 
 from bifocal.survey.weighted_similarity import UNKNOWNS, WeightedFit
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import skew
-from photocore.camera.similarity import Similarity
+from photocore.camera import Similarity, skew
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

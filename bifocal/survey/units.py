@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.photo import FARTHEST_WALL, Photo
+from bifocal.model import FARTHEST_WALL, Pair, Photo
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.point_survey import solve_points
 from bifocal.survey.relief_table import ReliefTable

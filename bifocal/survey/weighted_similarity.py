@@ -15,8 +15,7 @@ import numpy as np
 
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import skew
-from photocore.camera.similarity import Similarity
+from photocore.camera import Similarity, skew
 from photocore.errors import GeometryError
 
 #: Turns of Gauss-Newton: from the unweighted fit five reach rounding, also on walls that lean or

@@ -7,18 +7,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
+from bifocal.model import FlagLimits, Pair, Photo
+from bifocal.survey import (
+    RULES,
+    Georeference,
+    KnownPoints,
+    PointObservations,
+    ReliefTable,
+    SolvedSurvey,
+    SurveyMedia,
+    SurveySetup,
+    TapedDistance,
+    ToleranceRule,
+    WorldPoints,
+)
 from bifocal.survey.image_shift import image_shift
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.reference import Georeference, KnownPoints
-from bifocal.survey.relief_table import ReliefTable
-from bifocal.survey.setup import SurveySetup
-from bifocal.survey.solved_survey import SolvedSurvey, WorldPoints
-from bifocal.survey.survey_media import SurveyMedia
-from bifocal.survey.taped import TapedDistance
-from bifocal.survey.tolerances import RULES, ToleranceRule
 from bifocal.workbook.formulas.columns import (
     adjustment_names,
     ideal_points,
@@ -27,8 +30,7 @@ from bifocal.workbook.formulas.columns import (
 )
 from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS, PHOTOS, other_cells
 from photocore.arrays import BoolArray, FloatArray
-from photocore.workbook.changing.cells import CellValue, name_cell
-from photocore.workbook.making.live_columns import LiveColumn
+from photocore.workbook import CellValue, LiveColumn, name_cell
 
 #: Rows of the tables of an empty template.
 POINT_ROWS, CHECK_ROWS, CONTROL_ROWS, SPARE_ROWS = 300, 25, 12, 10

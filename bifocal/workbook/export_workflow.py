@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.exports import UNCERTAIN_FLAGS, export_points, write_shifts
-from bifocal.files.point_tables import read_survey_points
+from bifocal.files import UNCERTAIN_FLAGS, export_points, read_survey_points, write_shifts
 from bifocal.remarks import remark
-from bifocal.survey.results import shift_of
+from bifocal.survey import shift_of
 from bifocal.workbook.pair_workflow import is_survey, is_workbook, points_of
 from bifocal.workbook.workflow import solve
 from photocore.errors import InputError, located
 from photocore.output import check_not_input
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 
 def export(

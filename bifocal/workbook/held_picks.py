@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.files.photos import photo_info
-from bifocal.matching.pick_evidence import PickVerdict, held_against_photos
-from bifocal.model.pair import Pair
-from bifocal.survey.solved_survey import SolvedSurvey
+from bifocal.files import photo_info
+from bifocal.matching import PickVerdict, held_against_photos
+from bifocal.model import Pair
+from bifocal.survey import SolvedSurvey
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
 from photocore.images import read_grey

@@ -7,20 +7,15 @@ from typing import TypedDict
 
 import numpy as np
 
-from bifocal.files.haze import read_greys
-from bifocal.files.photos import photo_info, set_photo_info
-from bifocal.matching.matches import Matches
-from bifocal.matching.matching import MatchSettings, match_pair, precision
-from bifocal.matching.set_matching import match_set
-from bifocal.model.basis import rests_on
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
+from bifocal.files import photo_info, read_greys, set_photo_info
+from bifocal.matching import Matches, MatchSettings, match_pair, match_set, precision
+from bifocal.model import Pair, PhotoSet, rests_on
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations
+from bifocal.survey import PointObservations
 from bifocal.workbook.template_workflow import write_survey
 from photocore.arrays import ByteArray
 from photocore.output import check_ending
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 
 def match_photos(

@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.files.exports import export_points
+from bifocal.files import export_points
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.results import csv_columns
-from bifocal.survey.setup import SurveySetup
-from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.tolerances import RULES
+from bifocal.survey import (
+    RULES,
+    KnownPoints,
+    PointObservations,
+    SolvedSurvey,
+    SurveySetup,
+    csv_columns,
+)
 from bifocal.workbook.changing.kinds import check_kind, is_same_kind
 from bifocal.workbook.changing.own_table import add_results
 from bifocal.workbook.changing.update import BookUpdate, update_book
@@ -26,7 +28,7 @@ from photocore.errors import InputError
 from photocore.output import check_not_input, relative_name
 from photocore.tables import write_csv
 from photocore.tables.heading_words import bare
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 #: Sheets of a survey workbook, as `bare` writes them.
 _OURS = {

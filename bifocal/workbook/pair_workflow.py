@@ -7,14 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.lens import Lens
-from bifocal.model.orientation_precision import of_distances
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_set import PhotoSet, pair_or_set
-from bifocal.model.points import Points
+from bifocal.model import Lens, Pair, Photo, PhotoSet, Points, of_distances, pair_or_set
 from bifocal.remarks import remark
-from bifocal.survey.setup import SurveySetup
+from bifocal.survey import SurveySetup
 from bifocal.workbook.reading.reader import read_survey
 from bifocal.workbook.sources import BOOKS, described_pair
 from bifocal.workbook.workflow import solve

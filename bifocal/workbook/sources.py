@@ -6,18 +6,17 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from bifocal.matching.matches import Matches
+from bifocal.matching import Matches
 from bifocal.media import MediaOfPhoto
-from bifocal.model.lens import Lens
-from bifocal.model.pair import Pair
-from bifocal.model.photo import Photo
-from bifocal.model.photo_entries import SET_FORMAT
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import SET_FORMAT, Lens, Pair, Photo, PhotoSet
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.setup import SurveySetup
-from bifocal.survey.survey_input import SurveyInput, with_measured
-from bifocal.survey.units import refuse_far_stations
+from bifocal.survey import (
+    PointObservations,
+    SurveyInput,
+    SurveySetup,
+    refuse_far_stations,
+    with_measured,
+)
 from bifocal.workbook.reading.known_lists import read_long
 from bifocal.workbook.reading.pick_lists import joined, left_over, read_picks
 from bifocal.workbook.reading.reader import ReadOptions, read_survey

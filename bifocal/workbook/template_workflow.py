@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bifocal.model.pair import Pair
-from bifocal.survey.observations import PointObservations
-from bifocal.survey.other_photos import MOST_PHOTOS
-from bifocal.survey.point_survey import solve_points
-from bifocal.survey.survey_media import SurveyMedia
+from bifocal.model import Pair
+from bifocal.survey import MOST_PHOTOS, PointObservations, SurveyMedia, solve_points
 from bifocal.workbook.content import POINT_ROWS, SurveyContent
 from bifocal.workbook.making.book import write_book
 from bifocal.workbook.words import LANGUAGES
 from photocore.errors import InputError
 from photocore.output import check_ending, relative_name
 from photocore.provenance import file_hash, program, today
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 #: With more points a workbook would unpack to more than is read again (`reading.package`): a row
 #: of `Points` and `Results` takes up to 12 kB together.

@@ -7,17 +7,22 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.model.hypotheses import SCALE_TOLERANCE
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import SCALE_TOLERANCE, Pair, PhotoSet
 from bifocal.remarks import remark
-from bifocal.survey.setup import Measuring, Taking, given_of
-from bifocal.survey.solved_survey import SolvedSurvey
-from bifocal.survey.solver import solve_survey, solve_survey_of_set
-from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import SurveyMedia
-from bifocal.survey.tolerances import RULES, ToleranceRule, as_rule
-from bifocal.survey.units import refuse_not_above_zero
+from bifocal.survey import (
+    RULES,
+    Measuring,
+    SolvedSurvey,
+    SurveyInput,
+    SurveyMedia,
+    Taking,
+    ToleranceRule,
+    as_rule,
+    given_of,
+    refuse_not_above_zero,
+    solve_survey,
+    solve_survey_of_set,
+)
 from bifocal.workbook.formulas.setup_cells import cells_of
 from bifocal.workbook.reading.known_lists import with_list
 from bifocal.workbook.reading.reader import ReadOptions

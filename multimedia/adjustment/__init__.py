@@ -1,1 +1,5 @@
 """Bundle adjustment through the media."""
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -20,16 +20,15 @@ from multimedia.adjustment.plausibility import (
 )
 from multimedia.adjustment.start_poses import with_poses
 from multimedia.adjustment.unknowns import AUTO, Adjustment, Unknowns
-from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.projection import project as project_points
-from multimedia.orientation.calibration_covariance import with_covariance
-from multimedia.orientation.stray_rays import names_of, without_rows
-from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
+from multimedia.media import EXTERIOR, Camera
+from multimedia.media import project as project_points
+from multimedia.orientation import names_of, with_covariance, without_rows
+from multimedia.projects import SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.adjustment import Fit, huber_weights
 from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.rotation import skew
+from photocore.camera import skew
 from photocore.errors import ConvergenceError, GeometryError, InputError, PhotogrammetryError
 
 #: Robust weights settle in a few rounds; more change nothing that matters.

@@ -10,8 +10,8 @@ import numpy as np
 
 from multimedia.adjustment.media_unknowns import OF_MATERIAL, media_unknowns
 from multimedia.adjustment.unknowns import Unknowns
-from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
-from multimedia.projects.model import Project
+from multimedia.media import ANY_INTERIOR, EXTERIOR, Camera
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, IntArray
 from photocore.errors import InputError

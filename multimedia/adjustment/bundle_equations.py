@@ -9,14 +9,12 @@ from scipy.sparse import hstack
 
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.unknowns import Unknowns
-from multimedia.media.camera import EXTERIOR
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.projection import as_media, project_with_jacobian
-from multimedia.projects.model import Project
+from multimedia.media import EXTERIOR, FlatInterface, as_media, project_with_jacobian
+from multimedia.projects import Project
 from photocore.adjustment import BlockEquations, Fit
 from photocore.adjustment.network import LARGEST, Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.rotation import by_rotation, skew
+from photocore.camera import by_rotation, skew
 from photocore.errors import GeometryError
 
 #: A motion of everything is a datum defect if it moves image points by less than this share of

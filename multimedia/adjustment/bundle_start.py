@@ -12,15 +12,13 @@ from multimedia.adjustment.bundle_columns import place_columns, with_common_valu
 from multimedia.adjustment.bundle_equations import Bundle, ImageObservations
 from multimedia.adjustment.start_poses import bars_for
 from multimedia.adjustment.unknowns import Unknowns
-from multimedia.media.camera import Camera
-from multimedia.orientation.intersection import intersect
-from multimedia.orientation.object_rays import image_rays, nearest_points
-from multimedia.orientation.plate_poses import FEWEST, plate_pose
-from multimedia.projects.model import Project
+from multimedia.media import Camera
+from multimedia.orientation import FEWEST, image_rays, intersect, nearest_points, plate_pose
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.adjustment.network import NetworkState
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.similarity import fit_similarity
+from photocore.camera import fit_similarity
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
 #: Shares of the way from a camera to the surface: how close to it rays have to meet for their point

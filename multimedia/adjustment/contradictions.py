@@ -12,8 +12,8 @@ from multimedia.adjustment.bundle_equations import BEFORE, Bundle
 from multimedia.adjustment.bundle_start import points_without_start, prepare
 from multimedia.adjustment.start_poses import bars_for
 from multimedia.adjustment.unknowns import AUTO, Unknowns
-from multimedia.orientation.stray_rays import stray_rows, without_rows
-from multimedia.projects.model import Project
+from multimedia.orientation import stray_rows, without_rows
+from multimedia.projects import Project
 from photocore.adjustment import DenseEquations, huber_weights
 from photocore.adjustment.iteration import Linear, minimise
 from photocore.adjustment.network import Network, NetworkState

@@ -15,8 +15,8 @@ from multimedia.adjustment.bundle_start import prepare
 from multimedia.adjustment.interior_choice import choose_interior, with_interior
 from multimedia.adjustment.start_poses import with_poses
 from multimedia.adjustment.unknowns import AUTO, Unknowns
-from multimedia.media.camera import Camera
-from multimedia.projects.model import Project
+from multimedia.media import Camera
+from multimedia.projects import Project
 from photocore.adjustment.network import NetworkState
 from photocore.errors import PhotogrammetryError
 

@@ -10,8 +10,8 @@ import numpy as np
 from multimedia.adjustment.bundle_columns import interior_group
 from multimedia.adjustment.plausibility import significance
 from multimedia.adjustment.unknowns import Adjustment, Unknowns
-from multimedia.media.camera import ANY_INTERIOR
-from multimedia.projects.model import Project
+from multimedia.media import ANY_INTERIOR
+from multimedia.projects import Project
 from photocore.errors import ConvergenceError, GeometryError
 
 #: Tried in this order, from what matters most in an ordinary lens; those in one group together.

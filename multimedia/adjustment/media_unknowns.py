@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.projects.model import Project
+from multimedia.projects import Project
 from photocore.adjustment.priors import LEAST_INDEX, MOST_INDEX, SIGMA_INDEX, SIGMA_SHARE
 
 #: Unknowns that are properties of a material: one value for all media unless named.

@@ -11,13 +11,13 @@ from scipy.special import chdtrc, chdtri, ndtr
 from multimedia.adjustment.bundle_columns import BundleColumns
 from multimedia.adjustment.media_unknowns import media_unknowns
 from multimedia.adjustment.unknowns import Adjustment, Unknowns, is_angle
-from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
-from multimedia.projects.model import Project
+from multimedia.media import ANY_INTERIOR, EXTERIOR
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.adjustment.priors import ALIKE, UNCARRIED, is_possible
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError
-from photocore.reports.words import words_of
+from photocore.reports import words_of
 
 #: So many typical deviations of what is known of a medium tell nothing of it.
 UNDETERMINED = 1000.0

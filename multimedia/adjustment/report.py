@@ -11,13 +11,18 @@ import numpy as np
 from multimedia.adjustment import report_figures as figures
 from multimedia.adjustment.plausibility import alike_pairs, alike_remarks, remedy_of
 from multimedia.adjustment.unknowns import Adjustment, decimals
-from multimedia.media.camera import EXTERIOR
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
+from multimedia.media import (
+    EXTERIOR,
+    Cylinder,
+    FlatInterface,
+    Interfaces,
+    Plane,
+    RefractingSurface,
+    Sphere,
+)
 from multimedia.remarks import in_language
 from photocore.arrays import FloatArray
-from photocore.reports.document import (
+from photocore.reports import (
     Banner,
     Block,
     Document,
@@ -25,10 +30,12 @@ from photocore.reports.document import (
     Paragraph,
     Picture,
     TextTable,
+    Words,
+    dated_document,
+    provenance_blocks,
+    words_of,
+    write_document,
 )
-from photocore.reports.framing import dated_document, provenance_blocks
-from photocore.reports.words import Words, words_of
-from photocore.reports.writing import write_document
 
 #: Correlations from here on are listed with what tells the unknowns apart.
 STRONG = 0.9

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from multimedia.adjustment.unknowns import Adjustment
-from multimedia.media.camera import Camera, Sensor
+from multimedia.media import Camera, Sensor
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.reports.words import Words
+from photocore.reports import Words
 
 #: Cameras drawn beside one another.
 COLUMNS = 2

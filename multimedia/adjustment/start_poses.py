@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from multimedia.adjustment.unknowns import ScaleBar, Unknowns, bars_of
-from multimedia.orientation.camera_chains import stands_still
+from multimedia.orientation import names_of, stands_still, stray_rows, without_rows
 from multimedia.orientation.relative_orientation import relative_orientation
-from multimedia.orientation.stray_rays import names_of, stray_rows, without_rows
-from multimedia.projects.model import Project
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.errors import InputError
 

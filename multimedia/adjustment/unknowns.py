@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
-from multimedia.projects.model import Project
+from multimedia.media import ANY_INTERIOR, EXTERIOR
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT, correlations, standardised
 from photocore.arrays import FloatArray, positive
-from photocore.camera.fisheye import TERMS, Fisheye
+from photocore.camera import TERMS, Fisheye
 from photocore.errors import InputError
 
 #: How control points enter: error-free, with their sigmas, or as a free network.

@@ -12,14 +12,12 @@ from multimedia.adjustment.bundle import bundle_adjust
 from multimedia.adjustment.extensions import Extension, diagnose
 from multimedia.adjustment.report import write_adjustment_report
 from multimedia.adjustment.unknowns import Adjustment, ScaleBar, Unknowns
-from multimedia.projects.model import Project
-from multimedia.projects.project_file import read_project, write_project
-from multimedia.refraction.water import salinity_from_index, water_index_derivatives
+from multimedia.projects import Project, read_project, write_project
+from multimedia.refraction import salinity_from_index, water_index_derivatives
 from multimedia.remarks import remark
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
-from photocore.reports.words import words_of
-from photocore.reports.writing import check_report
+from photocore.reports import check_report, words_of
 
 #: Every group of object points is a plate.
 ALL = ("all",)

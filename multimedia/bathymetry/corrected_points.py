@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.height_field import HeightField
-from multimedia.media.height_field import WaterSurface as WaterSurface
-from multimedia.media.surfaces import Plane
-from multimedia.refraction.layers import checked_index
+from multimedia.media import HeightField, Plane
+from multimedia.media import WaterSurface as WaterSurface
+from multimedia.refraction import checked_index
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray, as_floats, not_negative, positive
 from photocore.errors import GeometryError, InputError

@@ -13,7 +13,7 @@ from multimedia.bathymetry.corrected_points import (
     Precision,
     WaterSurface,
 )
-from multimedia.media.surfaces import Plane
+from multimedia.media import Plane
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError

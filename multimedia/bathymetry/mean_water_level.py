@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtr
 from scipy.stats import poisson
 
-from multimedia.media.surfaces import Plane
+from multimedia.media import Plane
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.errors import GeometryError, InputError

@@ -14,8 +14,7 @@ from multimedia.bathymetry.corrected_points import (
     as_water_surface,
     checked_water_index,
 )
-from multimedia.media.ray_tracing import trace_rays
-from multimedia.media.surface_sequence import SurfaceSequence
+from multimedia.media import SurfaceSequence, trace_rays
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError, located
 

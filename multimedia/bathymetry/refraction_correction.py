@@ -22,11 +22,8 @@ from multimedia.bathymetry.corrected_points import (
     checked_water_index,
 )
 from multimedia.bathymetry.visible_points import VisiblePoints
-from multimedia.media.collinearity import Medium, shifts
-from multimedia.media.ray_tracing import aim_rays
-from multimedia.media.surface_sequence import SurfaceSequence
-from multimedia.media.surfaces import Plane, tangents_of
-from multimedia.refraction.layers import Layers
+from multimedia.media import Medium, Plane, SurfaceSequence, aim_rays, shifts, tangents_of
+from multimedia.refraction import Layers
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_floats, as_points
 from photocore.errors import GeometryError, InputError
 

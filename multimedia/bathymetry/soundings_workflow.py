@@ -11,9 +11,7 @@ from scipy.spatial import cKDTree
 
 from multimedia.bathymetry.regrid import bilinear
 from multimedia.bathymetry.soundings import DepthOffsets, depth_offsets
-from multimedia.projects.dem import Dem
-from multimedia.projects.point_tables import read_object_points
-from multimedia.projects.surface_files import read_water_surface
+from multimedia.projects import Dem, read_object_points, read_water_surface
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cloud import open_cloud

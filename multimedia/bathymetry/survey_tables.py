@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.projects.project_file import read_project
+from multimedia.projects import read_project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError

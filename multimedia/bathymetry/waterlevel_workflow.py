@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from multimedia.bathymetry.mean_water_level import WaterLevel, mean_water_level
-from multimedia.projects.surface_files import FORMAT
+from multimedia.projects import FORMAT
 from multimedia.remarks import remark
 from photocore.cloud import open_cloud
 from photocore.jsonfile import write_object

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.bathymetry.waves import wave_effect
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.height_field import WaveSurface
-from multimedia.media.optical_media import OpticalMedia
+from multimedia.media import FlatInterface, OpticalMedia, WaveSurface
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_points, positive
 from photocore.errors import InputError

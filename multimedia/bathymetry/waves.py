@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.bathymetry.refracted_rays import intersect_refracted_rays
-from multimedia.media.height_field import WaveSurface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.ray_tracing import aim_rays
+from multimedia.media import Interfaces, WaveSurface, aim_rays
 from photocore.arrays import FloatArray, IntArray, as_points
 from photocore.errors import InputError
 

@@ -30,9 +30,8 @@ from multimedia.bathymetry.survey_tables import (
     read_trajectory,
     read_visibility,
 )
-from multimedia.media.surfaces import Plane
-from multimedia.projects.dem import SENTINELS, Dem
-from multimedia.projects.surface_files import read_water_surface
+from multimedia.media import Plane
+from multimedia.projects import SENTINELS, Dem, read_water_surface
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.cli import Progress, no_progress

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multimedia.orientation.plate_poses import plate_pose
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.orientation import plate_pose
+from multimedia.projects import ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.charuco import BoardView
+from photocore.camera import BoardView
 from photocore.errors import ConvergenceError, GeometryError, InputError
 
 

@@ -8,14 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from multimedia.boards.board_points import PosedView, with_boards
-from multimedia.media.camera import Sensor
-from multimedia.projects.model import Project
-from multimedia.projects.photos import read_photo
-from multimedia.projects.project_file import project_files, read_project, write_project
+from multimedia.media import Sensor
+from multimedia.projects import Project, project_files, read_photo, read_project, write_project
 from multimedia.remarks import remark
 from photocore.arrays import ByteArray, positive
-from photocore.camera.boards import checked_board, detect_board, find_board_size
-from photocore.camera.charuco import BoardView, seen_markers
+from photocore.camera import BoardView, checked_board, detect_board, find_board_size, seen_markers
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input, check_writable

@@ -16,8 +16,7 @@ from photocore.options import Typed, declared
 from photocore.shared_options import JsonOption, LanguageOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from multimedia.adjustment.extensions import Extension
-    from multimedia.adjustment.unknowns import Adjustment
+    from multimedia.adjustment import Adjustment, Extension
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,8 +88,8 @@ def command(
     out: Path | None, report: Path | None, diagnose: bool, as_json: bool, **choices: Any,
 ) -> None:  # fmt: skip
     """Adjust cameras, object points and the media of a project together."""
+    from multimedia.adjustment import Unknowns, is_angle
     from multimedia.adjustment import workflow as adjust
-    from multimedia.adjustment.unknowns import Unknowns, is_angle
     from photocore.adjustment.priors import parse_prior
 
     if (wavelength is None) != (temperature is None):
@@ -130,7 +129,7 @@ def _ranked(extensions: list[Extension]) -> str:
 
 def _lines(result: Adjustment) -> list[str]:
     """Return sigma0, the unknowns and the suspects."""
-    from multimedia.adjustment.unknowns import decimals
+    from multimedia.adjustment import decimals
 
     rows = [
         (name, f"{value:.{max(6, decimals(s))}f}", f"{s:.2g}", unit)

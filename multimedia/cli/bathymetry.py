@@ -106,9 +106,7 @@ def command(source: Path, target: Path, beams: bool, as_json: bool, **wishes: An
     IN is a GeoTIFF (.tif), a point cloud (.csv .txt .xyz .ply .las .laz), or with --rays a table
     of measured rays. Points above the water stay as they are; every attribute is kept.
     """
-    from multimedia.bathymetry.corrected_points import Precision
-    from multimedia.bathymetry.correction_job import Job
-    from multimedia.bathymetry.workflow import correct_file
+    from multimedia.bathymetry import Job, Precision, correct_file
 
     beams = beams or wishes["trajectory"] is not None
     cameras = wishes["cameras"] is not None

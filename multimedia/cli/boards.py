@@ -13,7 +13,7 @@ from photocore.options import Argument, Typed, declared
 from photocore.shared_options import BoardOption, JsonOption, OverwriteOption, PatternOption
 
 if TYPE_CHECKING:
-    from multimedia.boards.workflow import DetectedBoards
+    from multimedia.boards import DetectedBoards
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ def command(options: BoardsCommand) -> None:
     `multimedia adjust --plate all` takes as a rigid body of unknown pose. Photos without a board
     are named with the reason; fewer than three boards before a camera are refused.
     """
-    from multimedia.boards.workflow import find_boards
+    from multimedia.boards import find_boards
 
     with progress_bar("Boards", quiet=options.as_json) as progress:
         found = find_boards(

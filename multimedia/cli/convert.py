@@ -48,7 +48,7 @@ def command(options: ConvertCommand) -> None:
     and OpenLPT. Poses, lenses and, where both hold them, ports, water surfaces and points go
     over exactly; what the other program cannot hold is said, or refused.
     """
-    from multimedia.exchange.workflow import convert
+    from multimedia.exchange import convert
 
     done = convert(
         options.source,

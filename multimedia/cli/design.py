@@ -17,8 +17,8 @@ from photocore.options import Argument, Typed, declared, options_of
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from multimedia.bathymetry.wave_statistics import WaveCase
-    from multimedia.design.studies import Design
+    from multimedia.bathymetry import WaveCase
+    from multimedia.design import Design
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,7 @@ def command(
     design.write_design(result, out=out, plot=plot, overwrite=overwrite)
     data, lines = design.as_dict(result), list(_lines(result))
     if waves is not None:
-        from multimedia.bathymetry.wave_statistics import waves_over
+        from multimedia.bathymetry import waves_over
 
         cases = waves_over(result.media, result.centres, result.study, waves, unit=result.unit)
         data["waves"] = [
@@ -135,7 +135,7 @@ def _wave_lines(result: Design, cases: tuple[WaveCase, ...]) -> Iterator[str]:
 
 def _lines(result: Design) -> Iterator[str]:
     """Yield the tables."""
-    from multimedia.design.studies import best_placement
+    from multimedia.design import best_placement
 
     unit = result.unit
     rows = [

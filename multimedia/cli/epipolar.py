@@ -16,7 +16,7 @@ from photocore.options import Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from multimedia.orientation.epipolar_workflow import EpipolarResult
+    from multimedia.orientation import EpipolarResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ def command(options: EpipolarCommand) -> None:
     """
     if options.photo is not None and options.picture is None:
         raise click.UsageError("--photo goes under a picture; give --picture as well.")
-    from multimedia.orientation.epipolar_workflow import epipolar_project
+    from multimedia.orientation import epipolar_project
 
     result = epipolar_project(
         options.project,

@@ -64,7 +64,7 @@ def command(
     """
     if (from_index is None) != (find is None):
         raise click.UsageError("--from-index and --find belong together.")
-    from multimedia.workbook.index_workflow import find_from_index, find_index
+    from multimedia.workbook import find_from_index, find_index
 
     sigma_index = given.pop("sigma_index")
     sigmas = {name: given.pop(name) for name in list(given) if name.startswith("sigma_")}

@@ -43,7 +43,7 @@ def command(options: IntersectCommand) -> None:
     sigma_image says), the camera to suspect where rays do not meet, and a status.
     """
     from multimedia.cli.tables import show
-    from multimedia.orientation.workflow import intersect_project
+    from multimedia.orientation import intersect_project
 
     table = intersect_project(
         options.project,

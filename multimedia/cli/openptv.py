@@ -52,7 +52,7 @@ def command(options: OpenptvCommand) -> None:
     camera are found by name and content, whatever folder they lie in; what was taken is said, and
     lists that no camera can have seen, alone or together with the others, are refused.
     """
-    from multimedia.openptv.workflow import export_openptv, import_openptv
+    from multimedia.openptv import export_openptv, import_openptv
 
     if options.export is not None:
         written, inexact = export_openptv(

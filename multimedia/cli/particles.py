@@ -48,7 +48,7 @@ def command(options: ParticlesCommand) -> None:
     How many come by chance is counted on the same targets displaced against each other; what
     cannot be told from that is refused.
     """
-    from multimedia.openptv.particles_workflow import find_particles
+    from multimedia.openptv import find_particles
 
     particles = find_particles(
         options.project,

@@ -38,7 +38,7 @@ def command(options: ProjectCommand) -> None:
     see have a status that says why.
     """
     from multimedia.cli.tables import show
-    from multimedia.orientation.workflow import project_project
+    from multimedia.orientation import project_project
 
     table = project_project(
         options.project, out=options.out, points=options.points, overwrite=options.overwrite

@@ -45,7 +45,7 @@ def command(project: Path, as_json: bool, **options: Any) -> None:
     may be as poor as you like. Prints every estimated parameter with its standard deviation;
     angles in degrees, image lengths in mm, object lengths in the unit of the project.
     """
-    from multimedia.orientation.workflow import resect_project, resected_as_dict
+    from multimedia.orientation import resect_project, resected_as_dict
 
     resected = resect_project(project, **options)
     data = resected_as_dict(resected)

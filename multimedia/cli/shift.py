@@ -61,7 +61,7 @@ def command(options: ShiftCommand) -> None:
         raise click.UsageError("give --out FILE, --json, or both.")
     if None not in (options.camera, options.z0):
         raise click.UsageError("give --camera or --z0, not both.")
-    from multimedia.workbook.workflow import shift_file
+    from multimedia.workbook import shift_file
 
     report = shift_file(
         options.source,

@@ -43,7 +43,7 @@ def command(options: SoundingsCommand) -> None:
     `multimedia bathymetry` with its sigmas; SOUNDINGS is a table or cloud X, Y, Z and, if there,
     sigma_Z. Offsets are sounding minus surface.
     """
-    from multimedia.bathymetry.soundings_workflow import check_soundings
+    from multimedia.bathymetry import check_soundings
 
     check = check_soundings(
         options.surface,

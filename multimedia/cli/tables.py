@@ -10,7 +10,7 @@ from photocore.cli import print_result, remark, text_table
 from photocore.options import Argument
 
 if TYPE_CHECKING:
-    from multimedia.orientation.workflow import PointTable
+    from multimedia.orientation import PointTable
 
 ProjectOption = Annotated[Path, Argument()]
 #: Rows printed when the table also goes into a file.

@@ -52,7 +52,7 @@ def command(options: TargetsCommand) -> None:
     OpenPTV's files count, as OpenPTV does, from the corner of the image, half a pixel more;
     `--project` has them count as the cameras do that will read them.
     """
-    from multimedia.targets.workflow import targets_of_images
+    from multimedia.targets import targets_of_images
 
     with progress_bar("Targets", quiet=options.as_json) as progress:
         images, remarks = targets_of_images(

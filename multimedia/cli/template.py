@@ -36,7 +36,7 @@ def command(options: ShiftTemplateCommand) -> None:
 
     No macros, no circular references: Excel, LibreOffice and others calculate it.
     """
-    from multimedia.workbook.workflow import write_template
+    from multimedia.workbook import write_template
 
     write_template(
         options.out,

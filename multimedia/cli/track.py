@@ -16,7 +16,7 @@ from photocore.options import Typed, declared
 from photocore.shared_options import JsonOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from multimedia.tracking.self_calibration import SelfCalibration
+    from multimedia.tracking import SelfCalibration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,8 +93,7 @@ def command(options: TrackCommand) -> None:
     Velocities are slopes of parabolas through five points of a track, with their standard
     deviations; vectors that go with none of those around are marked, not dropped.
     """
-    from multimedia.tracking.self_calibration import FIGURES
-    from multimedia.tracking.workflow import find_tracks
+    from multimedia.tracking import FIGURES, find_tracks
 
     result = find_tracks(
         options.project,

@@ -40,7 +40,7 @@ def command(options: WaterlevelCommand) -> None:
     POINTS is a table or point cloud (.csv .txt .xyz .ply .las .laz). The surface is the highest
     group of points of about one height; points on the bottom and blunders are rejected.
     """
-    from multimedia.bathymetry.waterlevel_workflow import fit_water_level
+    from multimedia.bathymetry import fit_water_level
 
     fitted = fit_water_level(
         options.source,

@@ -1,1 +1,5 @@
 """Accuracy studies of a set-up before anyone gets wet."""
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -13,15 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimedia.design.studies import CalibrationCosts, Placement, Study
-from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project, project_with_jacobian
-from multimedia.media.surfaces import tangents_of, unit_vector
-from multimedia.orientation.intersection import intersect
-from multimedia.orientation.object_rays import image_rays, largest_angle
-from multimedia.orientation.resection import resect
-from multimedia.refraction.layers import Layers
+from multimedia.media import (
+    EXTERIOR,
+    Camera,
+    FlatInterface,
+    Interfaces,
+    project,
+    project_with_jacobian,
+    tangents_of,
+    unit_vector,
+)
+from multimedia.orientation import image_rays, intersect, largest_angle, resect
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points, positive
 from photocore.errors import GeometryError, InputError, PhotogrammetryError

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from multimedia.design.studies import best_placement
-from multimedia.projects.point_tables import fill_sheet
-from photocore.reports.figure_file import write_figure
-from photocore.workbook.making.newbook import new_workbook, save_book
+from multimedia.projects import fill_sheet
+from photocore.reports import write_figure
+from photocore.workbook import new_workbook, save_book
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

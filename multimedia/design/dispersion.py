@@ -16,11 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.materials import Material
-from multimedia.refraction.shifting import radial_shift
-from multimedia.refraction.snell import refracted_angle
-from multimedia.refraction.water import QUAN_FRY, WaterFormula, water_refractive_index
+from multimedia.refraction import (
+    QUAN_FRY,
+    Layers,
+    Material,
+    WaterFormula,
+    radial_shift,
+    refracted_angle,
+    water_refractive_index,
+)
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, as_points, positive
 from photocore.errors import InputError

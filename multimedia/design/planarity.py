@@ -12,14 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.height_field import WaveSurface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import project
-from multimedia.media.ray_tracing import aim_rays
-from multimedia.media.surfaces import Plane, RefractingSurface, Sphere, tangents_of
-from multimedia.orientation.intersection import intersect
+from multimedia.media import (
+    Camera,
+    FlatInterface,
+    Interfaces,
+    Plane,
+    RefractingSurface,
+    Sphere,
+    WaveSurface,
+    aim_rays,
+    project,
+    tangents_of,
+)
+from multimedia.orientation import intersect
 from photocore.arrays import FloatArray, positive
 from photocore.errors import GeometryError, InputError
 

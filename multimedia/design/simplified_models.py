@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shifting import radial_shift_ratio
+from multimedia.refraction import Layers, radial_shift_ratio
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, positive
 from photocore.errors import InputError

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from multimedia.design.planarity import Deviation
-from multimedia.media.optical_media import OpticalMedia
+from multimedia.media import OpticalMedia
 from photocore.arrays import FloatArray
 
 

@@ -23,15 +23,14 @@ from multimedia.design.dispersion import layers_per_colour, seam_width
 from multimedia.design.planarity import Deviation, planarity_study
 from multimedia.design.simplified_models import agrafiotis, lavest, telem
 from multimedia.design.studies import Design, Placement, Study
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.projects.project_file import read_project
-from multimedia.refraction.layers import Layers
+from multimedia.media import Camera, FlatInterface
+from multimedia.projects import read_project
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable, check_ending
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 #: A millimetre in the units that projects use.
 MILLIMETRE = {"m": 1e-3, "cm": 0.1, "mm": 1.0}

@@ -1,1 +1,5 @@
 """Projects of other programs: COLMAP, Metashape, OpenCV, AquaCal."""
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -13,14 +13,11 @@ from typing import Any
 import numpy as np
 
 from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import Project
-from multimedia.projects.point_tables import METRES
-from multimedia.refraction.layers import Layers
+from multimedia.media import FlatInterface
+from multimedia.projects import FLIP, METRES, Project
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
-from photocore.camera.lensdata import LensData
-from photocore.camera.rotation import checked_rotation
+from photocore.camera import LensData, checked_rotation
 from photocore.errors import InputError
 from photocore.jsonfile import read_object, write_object
 from photocore.sections import FileSection

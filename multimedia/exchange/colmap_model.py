@@ -15,17 +15,13 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from multimedia.exchange.opencv_camera import camera_of, inexact, opencv_of
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.surfaces import Sphere
-from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
-from multimedia.refraction.layers import Layers
+from multimedia.media import Camera, FlatInterface, Interfaces, Sphere
+from multimedia.projects import FLIP, ImagePoints, ObjectPoints, Project
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import floats_of_words
 from photocore.errors import InputError
-from photocore.programs.colmap import (
+from photocore.programs import (
     CORNER,
     camera_words,
     digits,

@@ -14,11 +14,10 @@ from xml.etree.ElementTree import SubElement
 import numpy as np
 
 from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, left_out, opencv_of
-from multimedia.projects.model import Project
-from photocore.camera.fisheye import TERMS
+from multimedia.projects import Project
+from photocore.camera import TERMS
 from photocore.output import atomic_path
-from photocore.programs.colmap import digits
-from photocore.programs.metashape import FRAME, read_metashape_project
+from photocore.programs import FRAME, digits, read_metashape_project
 
 
 def read_metashape(path: Path, *, pitch: float, unit: str) -> Project:

@@ -16,13 +16,17 @@ from typing import Any
 import numpy as np
 
 from multimedia.exchange.opencv_camera import OpencvCamera, camera_of, left_out, opencv_of
-from multimedia.media.camera import Camera
-from multimedia.projects.model import Project
+from multimedia.media import Camera
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.lensdata import LensData
-from photocore.camera.lensformats import FISHEYE_KEY, opencv_values
-from photocore.camera.rotation import checked_rotation, rotation_from_vector
+from photocore.camera import (
+    FISHEYE_KEY,
+    LensData,
+    checked_rotation,
+    opencv_values,
+    rotation_from_vector,
+)
 from photocore.errors import InputError
 from photocore.output import atomic_folder, atomic_path
 from photocore.textfile import check_name

@@ -12,16 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Distortion, Sensor
-from multimedia.media.lens_conversion import farthest_miss, nearest_camera, sensor_rays
-from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import Project
+from multimedia.media import Camera, Distortion, Sensor, farthest_miss, nearest_camera, sensor_rays
+from multimedia.projects import FLIP, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.distortion import Brown, Convention
-from photocore.camera.fisheye import TERMS, Fisheye
-from photocore.camera.lensdata import LensData
-from photocore.camera.rotation import nearest_rotation
+from photocore.camera import TERMS, Brown, Convention, Fisheye, LensData, nearest_rotation
 from photocore.errors import InputError
 
 #: Size of a pixel where the file does not say, as these files never do. [mm]

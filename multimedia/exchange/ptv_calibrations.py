@@ -17,15 +17,12 @@ import cv2
 import numpy as np
 
 from multimedia.exchange.opencv_camera import FREE, camera_of
-from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.lens_conversion import farthest_miss, nearest_camera
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project, place_name
-from multimedia.refraction.layers import Layers
+from multimedia.media import EXTERIOR, Camera, FlatInterface, farthest_miss, nearest_camera
+from multimedia.projects import ImagePoints, ObjectPoints, Project, place_name
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensdata import LensData
-from photocore.camera.rotation import rotation_from_vector, world_from_camera
+from photocore.camera import LensData, rotation_from_vector, world_from_camera
 from photocore.errors import InputError
 from photocore.textfile import read_text, readable
 

@@ -12,13 +12,12 @@ from multimedia.exchange.metashape_project import read_metashape, write_metashap
 from multimedia.exchange.opencv_calibration import read_opencv, write_opencv
 from multimedia.exchange.opencv_camera import PITCH
 from multimedia.exchange.ptv_calibrations import is_ptv_calibration, read_ptv_calibration
-from multimedia.projects.model import Project
-from multimedia.projects.project_file import read_project, write_project
+from multimedia.projects import Project, read_project, write_project
 from multimedia.remarks import remark
 from photocore.errors import InputError
 from photocore.jsonfile import read_object
 from photocore.output import check_not_input
-from photocore.programs.colmap import is_colmap
+from photocore.programs import is_colmap
 from photocore.textfile import check_name, read_text
 
 _WRITERS: Mapping[str, Callable[..., tuple[str, ...]]] = {

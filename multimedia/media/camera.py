@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, as_floats, as_points, positive, read_only
-from photocore.camera.distortion import NAMES as DISTORTION
-from photocore.camera.distortion import Brown as Brown
-from photocore.camera.fisheye import Fisheye as Fisheye
-from photocore.camera.rotation import (
+from photocore.camera import NAMES as DISTORTION
+from photocore.camera import Brown as Brown
+from photocore.camera import Fisheye as Fisheye
+from photocore.camera import (
     angle_rates,
     angles_from_rotation,
     checked_rotation,

@@ -27,8 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shift import ratio_of
+from multimedia.refraction import Layers, ratio_of
 from photocore.arrays import FloatArray
 from photocore.compiled import inlined
 

@@ -19,9 +19,9 @@ from multimedia.media.collinearity import (
 )
 from multimedia.media.optical_media import OpticalMedia, Sight, SightDerivatives, by_pose
 from multimedia.media.surfaces import tangents_of, unit_vector
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera import rotation_from_vector
 from photocore.errors import GeometryError, InputError
 
 

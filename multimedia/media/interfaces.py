@@ -16,9 +16,9 @@ from multimedia.media.ray_tracing import aim_rays, pointing_changes, trace_rays
 from multimedia.media.surface_motion import Body, SurfaceMotion, bodies_of
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import Plane, RefractingSurface
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from photocore.arrays import FloatArray, as_floats, read_only
-from photocore.camera.rotation import checked_rotation, skew
+from photocore.camera import checked_rotation, skew
 from photocore.errors import InputError
 
 

@@ -9,7 +9,7 @@ from multimedia.media.camera_observations import CameraObservations, camera_of, 
 from multimedia.media.projection import Media, project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.distortion import Brown
+from photocore.camera import Brown
 from photocore.errors import InputError
 
 #: Points along the sides of the sensor at which cameras are compared.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from multimedia.media.camera import Camera
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import by_rotation
+from photocore.camera import by_rotation
 from photocore.errors import InputError
 
 

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
 from multimedia.media.flat_interface import FlatInterface
 from multimedia.media.optical_media import OpticalMedia, StraightRays
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from photocore.arrays import BoolArray, FloatArray, as_points
-from photocore.camera.fisheye import Fisheye
-from photocore.camera.pinhole import central, central_with_jacobian
+from photocore.camera import Fisheye, central, central_with_jacobian
 from photocore.errors import InputError
 
 #: What may be given to look through: parallel layers whose last face is the plane Z = 0, the same

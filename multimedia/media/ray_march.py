@@ -19,7 +19,7 @@ from multimedia.media.surface_motion import SurfaceMotion
 from multimedia.media.surface_sequence import SurfaceSequence
 from multimedia.media.surfaces import RefractingSurface
 from photocore.arrays import FloatArray, IntArray
-from photocore.camera.rotation import skew
+from photocore.camera import skew
 
 #: A ray may meet the next surface this far behind itself (share of the scene): surfaces in touch.
 TOUCH = 1e-12

@@ -21,7 +21,7 @@ from multimedia.media.surfaces import (
     tangents_of,
 )
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import rotation_from_vector, skew
+from photocore.camera import rotation_from_vector, skew
 
 #: Faces belong to one body if centres, axes or normals agree to this share of their size.
 TOGETHER = 1e-9

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from multimedia.media.surfaces import RefractingSurface
-from multimedia.refraction.layers import checked_indices
+from multimedia.refraction import checked_indices
 from photocore.arrays import BoolArray, FloatArray, as_floats
 from photocore.errors import InputError
 

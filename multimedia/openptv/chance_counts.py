@@ -15,7 +15,7 @@ from multimedia.openptv.correspondences import (
     expected_by_chance,
     is_chance,
 )
-from multimedia.projects.model import Project
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.machine import cores

@@ -8,12 +8,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.optical_media import OpticalMedia
-from multimedia.media.projection import Media, as_media, project
+from multimedia.media import Camera, Media, OpticalMedia, Sensor, as_media, project
 from multimedia.openptv.ray_meetings import meeting_rays
 from multimedia.openptv.target_map import TargetMap
-from multimedia.orientation.object_rays import image_rays, nearest_points, refuse_curved_rays
+from multimedia.orientation import image_rays, nearest_points, refuse_curved_rays
 from photocore.arrays import FloatArray, IntArray, each_once
 from photocore.errors import InputError
 

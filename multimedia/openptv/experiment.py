@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
+from multimedia.media import Camera, FlatInterface, Sensor
 from multimedia.openptv.openptv_cameras import (
     NO_MISFIT,
     OpenptvCamera,
@@ -34,10 +33,8 @@ from multimedia.openptv.openptv_files import (
 from multimedia.openptv.plane_files import find_sets, read_stems
 from multimedia.openptv.plane_sets import PlaneCandidates
 from multimedia.openptv.yaml_parameters import ENDINGS, PATTERN, read_yaml_parameters
-from multimedia.orientation.intersection import intersect
-from multimedia.orientation.workflow import known_misses
-from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
-from multimedia.projects.point_tables import METRES
+from multimedia.orientation import intersect, known_misses
+from multimedia.projects import METRES, SHOWN, ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError

@@ -12,15 +12,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.lens_conversion import brown_of, farthest_miss, nearest_camera, sensor_rays
-from multimedia.media.projection import project
-from multimedia.refraction.layers import Layers
+from multimedia.media import (
+    EXTERIOR,
+    Camera,
+    FlatInterface,
+    Interfaces,
+    Sensor,
+    brown_of,
+    farthest_miss,
+    nearest_camera,
+    project,
+    sensor_rays,
+)
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.distortion import Brown, Convention
+from photocore.camera import Brown, Convention
 from photocore.errors import InputError
 
 _NEEDED = "OpenPTV needs its sensor."

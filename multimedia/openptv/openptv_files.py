@@ -7,14 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.lens_conversion import brown_of
-from multimedia.refraction.layers import Layers
+from multimedia.media import Camera, FlatInterface, Sensor, brown_of
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray, floats_of_words
-from photocore.camera.distortion import Brown, Convention
-from photocore.camera.rotation import checked_rotation, nearest_rotation, world_from_camera
+from photocore.camera import (
+    Brown,
+    Convention,
+    checked_rotation,
+    nearest_rotation,
+    world_from_camera,
+)
 from photocore.errors import InputError
 from photocore.textfile import read_text
 

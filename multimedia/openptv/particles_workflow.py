@@ -10,9 +10,7 @@ from typing import Any
 from multimedia.openptv.chance_counts import chance_counts, narrower_counts, tolerance_remarks
 from multimedia.openptv.correspondences import TOLERANCE, correspondences
 from multimedia.openptv.openptv_files import read_targets, rt_is_text
-from multimedia.projects.model import Project
-from multimedia.projects.point_tables import METRES, write_columns
-from multimedia.projects.project_file import read_project
+from multimedia.projects import METRES, Project, read_project, write_columns
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import atomic_path, check_all_writable, check_not_input

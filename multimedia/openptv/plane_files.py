@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Sensor
+from multimedia.media import Sensor
 from multimedia.openptv.openptv_files import KIND
 from multimedia.openptv.plane_sets import PlaneCandidates, PlaneSet
 from photocore.arrays import FloatArray, IntArray, floats_of_words

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.projection import Media
+from multimedia.media import Camera, Media
 from multimedia.openptv.plane_sets import PlaneCandidates, PlaneSet
-from multimedia.orientation.resection import Resection, resect
+from multimedia.orientation import Resection, resect
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.projection import Media, project
-from multimedia.orientation.resection import resect
+from multimedia.media import Camera, Media, project
+from multimedia.orientation import resect
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import ConvergenceError, GeometryError, InputError
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media import Camera
 from multimedia.openptv.experiment import (
     NO_TARGETS,
     Experiment,
@@ -19,9 +19,15 @@ from multimedia.openptv.experiment import (
 from multimedia.openptv.openptv_files import DetectedTargets
 from multimedia.openptv.plane_matching import PlaneMatch, choose_sets
 from multimedia.openptv.target_matching import FIRST_RADIUS, is_chance, match_targets
-from multimedia.orientation.resection import resect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project, place_name
-from multimedia.projects.project_file import read_project, write_project
+from multimedia.orientation import resect
+from multimedia.projects import (
+    ImagePoints,
+    ObjectPoints,
+    Project,
+    place_name,
+    read_project,
+    write_project,
+)
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import PhotogrammetryError
 from photocore.output import check_all_writable, check_ending

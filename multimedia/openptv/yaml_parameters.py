@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import Sensor
+from multimedia.media import Sensor
 from multimedia.openptv.openptv_files import ControlParameters
 from multimedia.remarks import remark
 from photocore.errors import InputError

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import ANY_INTERIOR, EXTERIOR
-from multimedia.media.projection import project_with_jacobian
+from multimedia.media import ANY_INTERIOR, EXTERIOR, project_with_jacobian
 from multimedia.orientation.intersection import IntersectedPoints
-from multimedia.projects.model import Project
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError

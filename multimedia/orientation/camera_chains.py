@@ -9,17 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import as_media
+from multimedia.media import Camera, FlatInterface, Interfaces, as_media
 from multimedia.orientation.object_rays import image_rays, nearest_points
 from multimedia.orientation.ray_misses import ImagesOfCameras, cost, settled
-from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import SHOWN
+from multimedia.projects import FLIP, SHOWN
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import cameras_seeing
+from photocore.camera import cameras_seeing
 from photocore.errors import GeometryError
 
 #: Points that two cameras must both see for their essential matrix.

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import Camera
-from multimedia.media.projection import Media, as_media, project
+from multimedia.media import Camera, Media, as_media, project
 from multimedia.orientation.object_rays import image_rays, refuse_curved_rays
 from photocore.arrays import FloatArray, IntArray, as_points, positive
 from photocore.errors import InputError

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.projects.photos import read_photo
+from multimedia.projects import read_photo
 from photocore.arrays import FloatArray
 from photocore.output import check_ending
-from photocore.reports.figure_file import write_figure
+from photocore.reports import write_figure
 
 #: Curves whose depth marks are named; more would cover the photo.
 MOST_NAMED = 3

@@ -9,13 +9,11 @@ from typing import NotRequired, TypedDict
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media import Camera
 from multimedia.orientation.epipolar_curves import epipolar_candidates, epipolar_curve
 from multimedia.orientation.epipolar_picture import draw_epipolar
 from multimedia.orientation.intersection import intersect_pairs
-from multimedia.projects.model import SHOWN, Project
-from multimedia.projects.point_tables import write_columns
-from multimedia.projects.project_file import project_files, read_project
+from multimedia.projects import SHOWN, Project, project_files, read_project, write_columns
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError
 from photocore.output import all_or_none, check_all_writable, check_not_input

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtri
 
-from multimedia.media.camera import Camera
-from multimedia.media.optical_media import OpticalMedia
-from multimedia.media.projection import (
+from multimedia.media import (
+    Camera,
     Media,
+    OpticalMedia,
     as_media,
     project_with_jacobian,
     refuse_pixels,
@@ -38,7 +38,7 @@ from multimedia.orientation.point_kernel import (
 from multimedia.orientation.point_status import PointStatus
 from multimedia.orientation.pose_kernel import seen_points
 from multimedia.orientation.quick_pose import layering_of
-from multimedia.projects.model import SIGMA_IMAGE, SIGMA_PIXEL
+from multimedia.projects import SIGMA_IMAGE, SIGMA_PIXEL
 from photocore.adjustment import standardised
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
 from photocore.errors import InputError

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import Camera
-from multimedia.media.projection import Media, as_media, refuse_pixels
+from multimedia.media import Camera, Media, as_media, refuse_pixels
 from multimedia.orientation.pose_arrays import Layering
 from multimedia.orientation.pose_kernel import fitted_poses
 from multimedia.orientation.quick_pose import (
@@ -21,7 +20,7 @@ from multimedia.orientation.quick_pose import (
 )
 from multimedia.orientation.resection import DEEP, FITS, resect
 from photocore.arrays import BoolArray, FloatArray, IntArray, as_points
-from photocore.camera.rotation import angle_rates
+from photocore.camera import angle_rates
 from photocore.errors import InputError, PhotogrammetryError
 
 #: Smallest eigenvalue of the scaled normal matrix that the kernel's covariance is taken from; the

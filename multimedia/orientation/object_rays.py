@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import Camera
-from multimedia.media.optical_media import OpticalMedia
-from multimedia.media.projection import Media, as_media
+from multimedia.media import Camera, Media, OpticalMedia, as_media
 from multimedia.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, as_points
 from photocore.compiled import inlined

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
+from multimedia.media import Camera, FlatInterface, Interfaces
 from multimedia.orientation.resection import resect
 from photocore.arrays import FloatArray
 

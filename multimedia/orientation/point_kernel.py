@@ -13,10 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.collinearity import ray_beyond
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.optical_media import OpticalMedia
+from multimedia.media import Camera, FlatInterface, OpticalMedia, ray_beyond
 from multimedia.orientation.object_rays import cofactors, times
 from multimedia.orientation.point_status import PointStatus
 from multimedia.orientation.pose_arrays import Layering
@@ -24,7 +21,7 @@ from multimedia.orientation.pose_kernel import dot, less, out, seen_point
 from multimedia.orientation.quick_pose import layering_of
 from photocore.adjustment.outliers import CONTROLLED
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.distortion import STEPS, Brown, Convention, bent, bent_slopes, towards
+from photocore.camera import STEPS, Brown, Convention, bent, bent_slopes, towards
 from photocore.compiled import compiled, inlined
 
 #: Gauss-Newton steps: exact rays need one, picks a few pixels off three.

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import skew
+from photocore.camera import skew
 
 #: Halley's steps for the tangent: three settle it for nearly every ray below `STEEPEST`.
 ROOT_STEPS = 3

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.optical_media import OpticalMedia
+from multimedia.media import Camera, OpticalMedia
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import cameras_seeing
+from photocore.camera import cameras_seeing
 from photocore.errors import LARGEST, GeometryError
 
 #: Camera frame with y down and z forwards (OpenCV) from ours.

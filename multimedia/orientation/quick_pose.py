@@ -6,14 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.camera_observations import CameraObservations, start_at
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.optical_media import OpticalMedia, StraightRays
-from multimedia.media.projection import as_media
+from multimedia.media import (
+    Camera,
+    CameraObservations,
+    FlatInterface,
+    OpticalMedia,
+    StraightRays,
+    as_media,
+    start_at,
+)
 from multimedia.orientation.pose_arrays import Layering
 from multimedia.orientation.pose_kernel import fitted_pose
-from multimedia.refraction.tangent import ratios
+from multimedia.refraction import ratios
 from photocore.adjustment import Fit
 from photocore.adjustment.dense import DenseEquations
 from photocore.adjustment.network import NetworkState

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
+from multimedia.media import EXTERIOR, Camera, FlatInterface, Interfaces
 from multimedia.orientation.object_rays import image_rays, nearest_points
-from multimedia.projects.model import Project
+from multimedia.projects import Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import GeometryError, InputError

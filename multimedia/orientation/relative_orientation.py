@@ -12,11 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.projection import as_media
-from multimedia.media.surfaces import Plane
+from multimedia.media import Camera, FlatInterface, Interfaces, Plane, as_media
 from multimedia.orientation.camera_chains import (
     StraightPoses,
     stands_still,
@@ -33,11 +29,10 @@ from multimedia.orientation.ray_misses import (
     settled,
     typical_miss,
 )
-from multimedia.projects.camera_poses import FLIP
-from multimedia.projects.model import Project
+from multimedia.projects import FLIP, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera import rotation_from_vector
 from photocore.errors import GeometryError, InputError
 
 #: How far the faces are tilted against the cameras' mean axis, and in how many directions. [deg]

@@ -8,9 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multimedia.media.camera import ANY_INTERIOR, EXTERIOR, Camera
-from multimedia.media.camera_observations import CameraObservations, camera_of, start_at
-from multimedia.media.projection import Media, as_media, refuse_pixels
+from multimedia.media import (
+    ANY_INTERIOR,
+    EXTERIOR,
+    Camera,
+    CameraObservations,
+    Media,
+    as_media,
+    camera_of,
+    refuse_pixels,
+    start_at,
+)
 from multimedia.orientation.pose_starts import pose_starts
 from multimedia.orientation.quick_pose import quick_pose
 from multimedia.remarks import remark

@@ -9,7 +9,7 @@ import numpy as np
 
 from multimedia.orientation.object_rays import image_rays, nearest_points
 from multimedia.orientation.ray_misses import noise_as_angle
-from multimedia.projects.model import SHOWN, ImagePoints, Project
+from multimedia.projects import SHOWN, ImagePoints, Project
 from photocore.arrays import BoolArray, FloatArray
 
 #: Rays that miss their point by so many times what is typical are of other points.

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR
-from multimedia.media.projection import project as project_points
-from multimedia.media.projection import projection_status
+from multimedia.media import EXTERIOR, projection_status
+from multimedia.media import project as project_points
 from multimedia.orientation.calibration_covariance import with_calibration
 from multimedia.orientation.intersection import (
     IntersectedPoints,
@@ -21,15 +20,24 @@ from multimedia.orientation.intersection import (
 )
 from multimedia.orientation.point_status import PointStatus
 from multimedia.orientation.resection import Resection, resect
-from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints, Project
-from multimedia.projects.point_tables import read_image_points, read_object_points, write_columns
-from multimedia.projects.project_file import project_files, read_project, write_project
+from multimedia.projects import (
+    SHOWN,
+    ImagePoints,
+    ObjectPoints,
+    Project,
+    project_files,
+    read_image_points,
+    read_object_points,
+    read_project,
+    write_columns,
+    write_project,
+)
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError
 from photocore.output import all_or_none, check_all_writable, check_ending, check_not_input
 from photocore.tables.csvwrite import Columns
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 METHODS = ("rigorous", "rays", "pairs")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR
+from multimedia.media import EXTERIOR
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.rotation import (
+from photocore.camera import (
     checked_rotation,
     nearest_rotation,
     rotation_from_quaternion,

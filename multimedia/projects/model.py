@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from multimedia.media.camera import Camera
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.interfaces import Interfaces
+from multimedia.media import Camera, FlatInterface, Interfaces
 from photocore.arrays import FloatArray, read_only
 from photocore.errors import InputError
 from photocore.names import did_you_mean, meant

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import Camera
+from multimedia.media import Camera
 from multimedia.projects.model import SHOWN, ImagePoints, ObjectPoints
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError
@@ -206,7 +206,7 @@ def write_columns(path: Path, columns: Mapping[str, Cells], *, overwrite: bool) 
         raise InputError(f"{path}: tables are written as .csv or .xlsx; give one of these endings.")
     from openpyxl import Workbook
 
-    from photocore.workbook.making.newbook import new_workbook, save_book
+    from photocore.workbook import new_workbook, save_book
 
     book = Workbook()
     fill_sheet(book.active, list(columns), zip(*columns.values(), strict=True))
@@ -218,7 +218,7 @@ def fill_sheet(sheet: Any, headings: Sequence[str], rows: Iterable[Sequence[obje
     """Write a table into an empty sheet: bold headings that stay in sight, then the rows."""
     from openpyxl.styles import Font
 
-    from photocore.workbook.making.newbook import plain_cell
+    from photocore.workbook import plain_cell
 
     sheet.append(list(headings))
     for cell in sheet[1]:

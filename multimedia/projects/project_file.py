@@ -9,12 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.camera import EXTERIOR, Camera, Distortion, Sensor
-from multimedia.media.flat_interface import FlatInterface
-from multimedia.media.height_field import RasterSurface, WaveSurface
-from multimedia.media.interfaces import Interfaces
-from multimedia.media.mesh_surface import MeshSurface
-from multimedia.media.surfaces import Cylinder, Plane, RefractingSurface, Sphere
+from multimedia.media import (
+    EXTERIOR,
+    Camera,
+    Cylinder,
+    Distortion,
+    FlatInterface,
+    Interfaces,
+    MeshSurface,
+    Plane,
+    RasterSurface,
+    RefractingSurface,
+    Sensor,
+    Sphere,
+    WaveSurface,
+)
 from multimedia.projects.camera_poses import POSE_KEYS, read_pose
 from multimedia.projects.model import (
     SIGMA_IMAGE,
@@ -33,11 +42,10 @@ from multimedia.projects.point_tables import (
     write_columns,
 )
 from multimedia.projects.surface_files import read_mesh, read_raster, wave_rows, waves_of
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from photocore.arrays import is_finite_number, positive
-from photocore.camera.distortion import NAMES, Brown, Convention
-from photocore.camera.fisheye import Fisheye
+from photocore.camera import NAMES, Brown, Convention, Fisheye
 from photocore.errors import GeometryError, InputError, located
 from photocore.output import all_or_none, atomic_path, check_all_writable, relative_name
 from photocore.sections import FileSection

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.media.height_field import RasterSurface, WaterSurface, WaveSurface
-from multimedia.media.mesh_surface import MeshSurface
-from multimedia.media.surfaces import Plane
+from multimedia.media import MeshSurface, Plane, RasterSurface, WaterSurface, WaveSurface
 from multimedia.projects.dem import Dem
 from multimedia.remarks import remark
 from photocore.arrays import is_finite_number

@@ -6,3 +6,7 @@ radial shift exactly: its root is found by `tangent`, its derivatives are `shift
 `iteration` as the papers print it, `shift_table` as they tabulate it, `unrolled` as the
 workbook's cells compute it.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

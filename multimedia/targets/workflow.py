@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.openptv.openptv_files import targets_text
-from multimedia.projects.point_tables import write_columns
-from multimedia.projects.project_file import read_project
+from multimedia.openptv import targets_text
+from multimedia.projects import read_project, write_columns
 from multimedia.remarks import remark
 from multimedia.targets.target_images import TargetImages, find_targets
 from photocore.cli import Progress, no_progress

@@ -5,3 +5,7 @@
 `velocities` says how fast and how surely; `self_calibration` puts cameras right that have moved,
 `track_files` writes tracks, `workflow` is the command.
 """
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimedia.adjustment.bundle import bundle_adjust
-from multimedia.adjustment.unknowns import Adjustment, Unknowns
-from multimedia.media.camera import EXTERIOR
+from multimedia.adjustment import Adjustment, Unknowns, bundle_adjust
+from multimedia.media import EXTERIOR
 from multimedia.openptv.chance_counts import chance_counts
 from multimedia.openptv.correspondences import correspondences
-from multimedia.orientation.intersection import intersect
-from multimedia.projects.model import ImagePoints, ObjectPoints, Project
+from multimedia.orientation import intersect
+from multimedia.projects import ImagePoints, ObjectPoints, Project
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import GeometryError, InputError

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from multimedia.openptv.openptv_files import rt_is_text
-from multimedia.projects.point_tables import write_columns
+from multimedia.openptv import rt_is_text
+from multimedia.projects import write_columns
 from multimedia.tracking.tracks import Tracks
 from photocore.arrays import FloatArray, IntArray
 from photocore.errors import InputError, MissingExtraError

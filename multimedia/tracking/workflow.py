@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from multimedia.openptv.chance_counts import (
+from multimedia.openptv import (
+    TOLERANCE,
     ChanceCounts,
-    chance_counts,
     narrower_counts,
+    read_blobs,
+    read_targets,
     tolerance_remarks,
 )
-from multimedia.openptv.correspondences import TOLERANCE, correspondences
-from multimedia.openptv.openptv_files import read_blobs, read_targets
-from multimedia.orientation.intersection import intersect
-from multimedia.projects.model import SIGMA_PIXEL, Project
-from multimedia.projects.point_tables import METRES
-from multimedia.projects.project_file import read_project, write_project
+from multimedia.openptv.chance_counts import chance_counts
+from multimedia.openptv.correspondences import correspondences
+from multimedia.orientation import intersect
+from multimedia.projects import METRES, SIGMA_PIXEL, Project, read_project, write_project
 from multimedia.remarks import remark
 from multimedia.tracking.self_calibration import (
     CAMERAS_OFF,

@@ -1,1 +1,5 @@
 """Radial shift and refractive index as tables and live workbooks."""
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -7,16 +7,13 @@ from typing import Any
 import numpy as np
 from openpyxl.chart import Reference
 
-from multimedia.refraction.water import (
+from multimedia.refraction import (
     QUAN_FRY,
     salinity_from_index,
     water_index_derivatives,
     water_refractive_index,
 )
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_charts import scatter
-from photocore.workbook.making.live_columns import FormulaBook
-from photocore.workbook.making.look import HEAD_FONT
+from photocore.workbook import HEAD_FONT, BookBuilder, FormulaBook, SheetBuilder, scatter
 
 FORMULAS = FormulaBook(__package__)
 #: Name, value, unit and limits of the cells to fill in.

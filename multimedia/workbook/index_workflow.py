@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
 
-from multimedia.refraction.water import (
+from multimedia.refraction import (
     WATER_FORMULAS,
     WaterFormula,
     salinity_from_index,

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from photocore.errors import CellError, InputError, WorkbookError, located
 from photocore.tables import Column, Table, open_tables, read_named_values, read_table
 from photocore.tables.csvread import CsvFile
-from photocore.workbook.reading.grid import SheetFile, cell_name
+from photocore.workbook import SheetFile, cell_name
 
 #: Name of the first value on the sheet of camera and media in a workbook of the user's own.
 MEDIA = "multimedia_media"

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimedia.refraction.layers import Layers
-from multimedia.refraction.shifting import radial_shift_ratio
+from multimedia.refraction import Layers, radial_shift_ratio
 from multimedia.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import InputError

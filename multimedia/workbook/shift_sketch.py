@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photocore.workbook.making.sketch import Sketch
+from photocore.workbook import Sketch
 
 #: Colours that the colour-blind tell apart (Okabe and Ito); dashes and symbols say the same.
 _RAY, _STRAIGHT, _WATER, _INK = "0072B2", "D55E00", "56B4E9", "222222"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from multimedia.refraction.unrolled import STEPS
+from multimedia.refraction import STEPS
 from multimedia.remarks import remark
 from multimedia.workbook.shift_files import MEDIA, ShiftInput
 from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
@@ -19,20 +19,19 @@ from multimedia.workbook.shift_workbook import (
 from multimedia.workbook.words import WORDS
 from photocore.errors import InputError
 from photocore.tables import Table
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import make_numbers, place_of
-from photocore.workbook.changing.result_columns import (
+from photocore.workbook import (
+    BookBuilder,
+    CellValue,
     OwnTable,
     ResultColumn,
-    head_row,
-    put_result_columns,
-)
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import (
     TableArea,
+    WorkbookEditor,
     column_letters,
+    head_row,
+    make_numbers,
+    place_of,
     plain_title,
+    put_result_columns,
     quoted_title,
     split_area,
     split_cell,

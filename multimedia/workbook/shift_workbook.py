@@ -12,8 +12,7 @@ from openpyxl.chart import Reference
 from openpyxl.styles import Font
 from openpyxl.utils import get_column_letter
 
-from multimedia.refraction.layers import HIGHEST_INDEX
-from multimedia.refraction.unrolled import STEPS, TOLERANCE, unrolled_shift
+from multimedia.refraction import HIGHEST_INDEX, STEPS, TOLERANCE, unrolled_shift
 from multimedia.remarks import remark
 from multimedia.workbook.index_sheet import FORMULAS, write_index_sheet
 from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
@@ -22,11 +21,7 @@ from multimedia.workbook.words import WORDS
 from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_ending
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_charts import scatter
-from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.making.look import (
+from photocore.workbook import (
     DOUBT,
     FACE,
     GOOD,
@@ -34,9 +29,14 @@ from photocore.workbook.making.look import (
     HEAD_FONT,
     LABEL,
     LABEL_FONT,
+    BookBuilder,
+    CellValue,
+    LiveColumn,
+    SheetBuilder,
+    check_new_workbook,
     colour_words,
+    scatter,
 )
-from photocore.workbook.making.newbook import check_new_workbook
 
 #: More rows make a workbook that is slow to open; text tables have no limit.
 MOST_ROWS = 20_000

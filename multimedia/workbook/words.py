@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photocore.workbook.making.words import LANGUAGES, WordBook
+from photocore.workbook import LANGUAGES, WordBook
 
 __all__ = ["LANGUAGES", "WORDS"]
 

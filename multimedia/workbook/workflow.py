@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from multimedia.refraction.layers import Layers
+from multimedia.refraction import Layers
 from multimedia.remarks import remark
 from multimedia.workbook.shift_files import points_of, read_shift_input
 from multimedia.workbook.shift_points import ShiftPoints, ShiftResult, ShiftSetup
@@ -14,7 +14,7 @@ from multimedia.workbook.shift_workbook import write_shift_workbook
 from photocore.errors import InputError
 from photocore.output import check_ending, check_not_input
 from photocore.tables import write_csv
-from photocore.workbook.making.newbook import check_new_workbook
+from photocore.workbook import check_new_workbook
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,1 +1,5 @@
 """The camera: pinhole, lens models and their files, rotation, similarity, boards."""
+
+from photocore.public_names import public_names
+
+__all__ = public_names(__name__, __file__)

@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.lensdata import LensData, lens_data
-from photocore.camera.rotation import checked_rotation, nearest_rotation
+from photocore.camera import LensData, checked_rotation, lens_data, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
 from photocore.programs.model import ForeignProject, ForeignView

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensdata import lens_data
-from photocore.camera.rotation import checked_rotation, nearest_rotation
+from photocore.camera import checked_rotation, lens_data, nearest_rotation
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.textfile import read_text

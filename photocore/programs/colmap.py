@@ -14,9 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensdata import LensData
-from photocore.camera.lensformats import COLMAP_NUMBERS, colmap_lens, colmap_parameters
-from photocore.camera.rotation import quaternion_from_rotation, rotation_from_quaternion
+from photocore.camera import (
+    COLMAP_NUMBERS,
+    LensData,
+    colmap_lens,
+    colmap_parameters,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from photocore.errors import LARGEST, InputError
 from photocore.output import atomic_folder
 from photocore.programs.model import ForeignProject, ForeignView

@@ -15,9 +15,14 @@ from xml.etree import ElementTree
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensfit import FittedLens
-from photocore.camera.lensformats import PROJECTIONS, metashape_lens, xml_root
-from photocore.camera.rotation import checked_rotation, nearest_rotation
+from photocore.camera import (
+    PROJECTIONS,
+    FittedLens,
+    checked_rotation,
+    metashape_lens,
+    nearest_rotation,
+    xml_root,
+)
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView, chosen_part
 from photocore.remarks import remark

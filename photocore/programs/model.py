@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from photocore.arrays import FloatArray
-from photocore.camera.lensdata import LensData
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import LensData, Pinhole
 from photocore.errors import InputError
 from photocore.remarks import remark
 

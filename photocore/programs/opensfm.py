@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photocore.camera.lensdata import LensData, lens_data
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera import LensData, lens_data, rotation_from_vector
 from photocore.errors import InputError
 from photocore.programs.json_values import JsonValue
 from photocore.programs.model import ForeignProject, ForeignView, chosen_part

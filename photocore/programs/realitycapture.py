@@ -16,9 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensfit import FittedLens, brown_lens
-from photocore.camera.lensformats import xml_root
-from photocore.camera.rotation import checked_rotation, nearest_rotation
+from photocore.camera import FittedLens, brown_lens, checked_rotation, nearest_rotation, xml_root
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView
 from photocore.programs.nerf import TURN

@@ -17,9 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from photocore.arrays import FloatArray, floats_of_words
-from photocore.camera.lensdata import lens_data
-from photocore.camera.lensfit import FittedLens, fitted_lens
-from photocore.camera.rotation import rotation_from_quaternion
+from photocore.camera import FittedLens, fitted_lens, lens_data, rotation_from_quaternion
 from photocore.errors import InputError
 from photocore.programs.model import ForeignProject, ForeignView, chosen_part
 from photocore.programs.photos import PhotoFinder

@@ -7,7 +7,7 @@ from functools import cache
 
 from photocore.errors import InputError
 from photocore.textfile import packaged
-from photocore.workbook.making.words import LANGUAGES
+from photocore.workbook import LANGUAGES
 
 __all__ = ["LANGUAGES", "texts_of", "words_of"]
 

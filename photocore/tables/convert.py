@@ -23,7 +23,7 @@ from photocore.tables.numbers import (
     take_apart,
     unit_symbol,
 )
-from photocore.workbook.reading.grid import CellDate, CellFault, NamedNumber, NotCalculated, Value
+from photocore.workbook import CellDate, CellFault, NamedNumber, NotCalculated, Value
 
 Complain = Callable[[int, str], None]
 

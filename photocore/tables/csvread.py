@@ -24,7 +24,7 @@ from photocore.tables.lists import as_table
 from photocore.tables.model import Column
 from photocore.tables.numbers import ArrowTexts, Decimal, is_clear, plain_numbers, take_apart
 from photocore.textfile import readable
-from photocore.workbook.reading.grid import CellGrid, SheetFile, Value, cell_name
+from photocore.workbook import CellGrid, SheetFile, Value, cell_name
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _COMMENTED = re.compile(r"^[ \t]*(?:#|//)", re.M)

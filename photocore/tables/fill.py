@@ -15,7 +15,7 @@ from photocore.tables.heading_words import bare, unknown_unit
 from photocore.tables.headings import Match
 from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, GRAD, Decimal, unit_symbol
-from photocore.workbook.reading.grid import CellDate, CellGrid, Value, cell_name, column_letters
+from photocore.workbook import CellDate, CellGrid, Value, cell_name, column_letters
 
 
 def fill(

@@ -16,12 +16,7 @@ from photocore.tables.heading_words import (
     unknown_unit,
 )
 from photocore.tables.model import Column
-from photocore.workbook.reading.grid import (
-    CellGrid,
-    Value,
-    column_letters,
-    column_number,
-)
+from photocore.workbook import CellGrid, Value, column_letters, column_number
 
 _PHOTO = re.compile(
     r"\b(?:image|photo|picture|foto|bild|immagine|aufnahme|camera|kamera|fotocamera)\s*([12])\b"

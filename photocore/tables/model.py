@@ -13,7 +13,7 @@ from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError
 from photocore.provenance import note_remark
 from photocore.remarks import remark
-from photocore.workbook.reading.grid import cell_name, column_letters
+from photocore.workbook import cell_name, column_letters
 
 #: Coordinates of one point in several rows may differ by this much.
 _SAME = 1e-6

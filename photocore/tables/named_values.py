@@ -15,7 +15,7 @@ from photocore.tables.heading_words import bare, unit_of, unknown_unit
 from photocore.tables.model import Column, NamedValues
 from photocore.tables.numbers import Decimal, converted, take_apart
 from photocore.tables.read import Source, open_tables
-from photocore.workbook.reading.grid import CellGrid, NotCalculated, SheetFile, Value, cell_name
+from photocore.workbook import CellGrid, NotCalculated, SheetFile, Value, cell_name
 
 #: Rows of a sheet in which labels of single values are looked for.
 _LABELLED = 400

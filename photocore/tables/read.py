@@ -38,8 +38,7 @@ from photocore.tables.model import Column, Table
 from photocore.tables.numbers import FEET, Decimal, take_apart
 from photocore.tables.rows import DataRows, block_above, data_rows
 from photocore.textfile import check_file, check_name
-from photocore.workbook.reading.grid import CellGrid, SheetFile, TableArea, Value, cell_name
-from photocore.workbook.reading.package import check_header
+from photocore.workbook import CellGrid, SheetFile, TableArea, Value, cell_name, check_header
 
 Source = Path | str | SheetFile | CsvFile
 
@@ -82,11 +81,11 @@ def open_tables(path: Path | str, *, max_rows: int = 100_000) -> SheetFile | Csv
     if ending in (".xls", ".xlsb", ".numbers", ".fods"):
         raise InputError(f"{path}: {ending} files cannot be read; save the workbook as .xlsx.")
     if ending in (".ods", ".ots"):
-        from photocore.workbook.reading.ods import open_ods
+        from photocore.workbook import open_ods
 
         return open_ods(path, max_rows=max_rows + _MARGIN)
     if ending in (".xlsx", ".xlsm", ".xltx", ".xltm"):
-        from photocore.workbook.reading.xlsx import open_xlsx
+        from photocore.workbook import open_xlsx
 
         return open_xlsx(path, max_rows=max_rows + _MARGIN)
     check_header(path)

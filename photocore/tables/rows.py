@@ -9,7 +9,7 @@ from photocore.remarks import remark
 from photocore.tables.heading_words import bare
 from photocore.tables.headings import Match, is_summary
 from photocore.tables.model import Column
-from photocore.workbook.reading.grid import CellGrid, Value
+from photocore.workbook import CellGrid, Value
 
 #: What a row begins with that is switched off.
 COMMENTS = ("#", "//")

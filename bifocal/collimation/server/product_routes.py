@@ -28,7 +28,7 @@ from bifocal.collimation.shapes import met, places_of, relief_within
 from bifocal.collimation.starting import open_sample, open_wall, recent, reopen, walls_at_hand
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.collimation.workbook.profile_book import profile_book, profile_csv
-from bifocal.faces.faces_files import beside
+from bifocal.faces import beside
 from photocore.arrays import FloatArray, as_points
 from photocore.jsonfile import plain
 from photocore.output import relative_name

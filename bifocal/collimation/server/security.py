@@ -13,7 +13,7 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bifocal.collimation.wording import say
-from photocore.workbook.making.words import LANGUAGES
+from photocore.workbook import LANGUAGES
 
 #: Bodies of commands, and of two dropped photos. [bytes]
 LARGEST_COMMAND, LARGEST_PHOTOS = 1 << 20, 1 << 30

@@ -20,16 +20,15 @@ from bifocal.collimation.scale import free_report, is_unscaled, kept_report
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import measures_of
 from bifocal.collimation.wording import say, without_options
-from bifocal.model.pair import Pair
-from bifocal.model.photo_set import PhotoSet
-from bifocal.orientation.align_workflow import interior_of_photo
-from bifocal.reports.accuracy import precision_in_words
-from bifocal.survey.tolerances import SCALES
+from bifocal.model import Pair, PhotoSet
+from bifocal.orientation import interior_of_photo
+from bifocal.reports import precision_in_words
+from bifocal.survey import SCALES
 from photocore.errors import PhotogrammetryError
 from photocore.images import ImageInfo
 from photocore.jsonfile import plain
 from photocore.remarks import LEVELS, level_of
-from photocore.reports.words import words_of
+from photocore.reports import words_of
 
 
 def state_of(session: Session) -> dict[str, object]:

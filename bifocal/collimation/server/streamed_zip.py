@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from pathlib import Path
 
-from bifocal.files.hash_list import SUMS
+from bifocal.files import SUMS
 
 #: Bytes read at a time.
 PIECE = 1 << 20

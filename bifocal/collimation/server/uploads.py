@@ -14,7 +14,7 @@ from typing import BinaryIO
 from PIL import Image
 
 from bifocal.collimation.project import PHOTOS
-from bifocal.files.exif_judge import judged_focal
+from bifocal.files import judged_focal
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.images import FORMATS, ImageInfo, image_info, read_image

@@ -8,10 +8,17 @@ from collections.abc import Mapping
 from openpyxl.utils import get_column_letter
 
 from bifocal.collimation.wording import say
-from photocore.workbook.changing.cells import CellValue, name_cell
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.making.look import HEAD_FILL, HEAD_FONT, LABEL_FONT, add_table, new_book
-from photocore.workbook.making.newbook import finished_parts
+from photocore.workbook import (
+    HEAD_FILL,
+    HEAD_FONT,
+    LABEL_FONT,
+    CellValue,
+    WorkbookEditor,
+    add_table,
+    finished_parts,
+    name_cell,
+    new_book,
+)
 
 #: Of an outline by its name: what it is called on drawings, and its measures. [m, m2]
 Outlines = Mapping[str, Mapping[str, CellValue]]

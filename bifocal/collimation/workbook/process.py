@@ -14,7 +14,7 @@ from bifocal.collimation.records import PickedPoint
 from bifocal.collimation.workbook.outlines import Outlines
 from bifocal.collimation.workbook.rows import change_rows, read_rows
 from bifocal.remarks import remark
-from bifocal.workbook.pair_workflow import read_pair
+from bifocal.workbook import read_pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.remarks import learn, with_keys
 

@@ -13,8 +13,7 @@ from openpyxl.drawing.line import LineProperties
 from openpyxl.worksheet.properties import PageSetupProperties
 
 from photocore.arrays import FloatArray
-from photocore.workbook.making.live_charts import COLOURS, scatter
-from photocore.workbook.making.newbook import plain_cell, save_book
+from photocore.workbook import COLOURS, plain_cell, save_book, scatter
 
 #: Heading of each column.
 HEADINGS = ("distance [m]", "X [m]", "Y [m]", "r [m]", "sigma_r [m]")

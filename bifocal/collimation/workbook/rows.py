@@ -15,25 +15,25 @@ from bifocal.collimation.live_results import observations
 from bifocal.collimation.records import Known, PickedPoint, Picks, Pixel, SurveyState
 from bifocal.collimation.workbook.outlines import KEYS, TABLE, Outlines, add_outlines, outline_cells
 from bifocal.collimation.workbook.setup import typed_setup
-from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair
+from bifocal.model import FlagLimits, Pair
 from bifocal.remarks import remark
-from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import MOST, SurveyMedia, media_names
-from bifocal.workbook.changing.update import update_book
-from bifocal.workbook.content import SurveyContent, setup_cells
-from bifocal.workbook.formulas.setup_cells import MATRICES, NADIRS
-from bifocal.workbook.output import result_content, typed_content
-from bifocal.workbook.pair_workflow import is_survey
-from bifocal.workbook.reading.reader import read_survey
-from bifocal.workbook.template_workflow import write_survey
-from bifocal.workbook.workflow import solve
+from bifocal.survey import MOST, SurveyInput, SurveyMedia, media_names
+from bifocal.workbook import (
+    MATRICES,
+    NADIRS,
+    SurveyContent,
+    is_survey,
+    read_survey,
+    result_content,
+    setup_cells,
+    solve,
+    typed_content,
+    update_book,
+    write_survey,
+)
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.output import atomic_path, check_not_open, kept_copy, relative_name, scratch_beside
-from photocore.workbook.changing.cells import CellValue, name_cell
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import place_of
-from photocore.workbook.reading.grid import TableArea
+from photocore.workbook import CellValue, TableArea, WorkbookEditor, name_cell, place_of
 
 #: Rows added at once where the prepared ones are used up.
 MORE_ROWS = 50

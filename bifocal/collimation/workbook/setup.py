@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from bifocal.collimation.project import SurveyFiles
-from bifocal.model.pair import Pair
+from bifocal.model import Pair
 from bifocal.remarks import remark
-from bifocal.survey.setup import SurveySetup
-from bifocal.workbook.pair_workflow import read_pair
-from bifocal.workbook.reading.reader import read_survey
+from bifocal.survey import SurveySetup
+from bifocal.workbook import read_pair, read_survey
 from photocore.errors import InputError
-from photocore.workbook.changing.cells import CellValue
+from photocore.workbook import CellValue
 
 
 def pair_of(files: SurveyFiles) -> Pair | None:

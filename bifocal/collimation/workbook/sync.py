@@ -21,8 +21,7 @@ from bifocal.collimation.workbook.rows import (
     row_of,
     write_new,
 )
-from bifocal.model.flags import FlagLimits
-from bifocal.model.pair import Pair
+from bifocal.model import FlagLimits, Pair
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import plain

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bifocal.remarks import remark
-from bifocal.survey.survey_input import SurveyInput
-from bifocal.survey.survey_media import NORMALS
+from bifocal.survey import NORMALS, SurveyInput
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.reading.setup_reader import media_count
 from photocore.errors import InputError

@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.reference import Georeference
-from bifocal.survey.relief_table import ENTRIES
-from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey import ENTRIES, Georeference, SurveyInput
 from bifocal.workbook.changing.kinds import refuse_earlier
 from bifocal.workbook.changing.setup_update import add_sheets, write_corrections, write_options
 from bifocal.workbook.changing.update import (
@@ -31,19 +29,22 @@ from bifocal.workbook.reading.setup_reader import home_of
 from bifocal.workbook.words import term, word
 from photocore.errors import InputError
 from photocore.tables import Table
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import make_numbers, place_of
-from photocore.workbook.changing.plain import PlainFormulas
-from photocore.workbook.changing.result_columns import (
+from photocore.workbook import (
+    BookBuilder,
+    CellValue,
+    LiveColumn,
     OwnTable,
+    PlainFormulas,
     ResultColumn,
+    WorkbookEditor,
+    fixed_cell,
     head_row,
+    make_numbers,
+    place_of,
     put_result_columns,
+    quoted_title,
+    split_cell,
 )
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.reading.grid import fixed_cell, quoted_title, split_cell
 
 #: Name of the headings of the results in a workbook of the user's own.
 MARK = "bifocal_results"

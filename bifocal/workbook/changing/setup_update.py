@@ -14,13 +14,18 @@ from bifocal.workbook.formulas.setup_cells import TITLE_BLOCK, cells_of, formula
 from bifocal.workbook.making.charts import HEAD, KEYS, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
-from photocore.workbook.calculating.calculation import Calculation
-from photocore.workbook.calculating.values import Unknown
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import place_of
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import NotCalculated, fixed_cell, quoted_title, with_names
+from photocore.workbook import (
+    BookBuilder,
+    Calculation,
+    CellValue,
+    NotCalculated,
+    Unknown,
+    WorkbookEditor,
+    fixed_cell,
+    place_of,
+    quoted_title,
+    with_names,
+)
 
 #: Options that have no cell of their own; those of the distances depend on each other.
 _OTHERS = {"d1", "d2", "pair", "rules", "adjust_setup"}

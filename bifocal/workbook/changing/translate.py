@@ -9,10 +9,7 @@ from openpyxl import Workbook
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.book import build
 from bifocal.workbook.words import word
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import place_of
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.reading.grid import plain_title
+from photocore.workbook import BookBuilder, WorkbookEditor, place_of, plain_title
 
 #: Words in charts, footers and rules: they stand in no cell.
 _ELSEWHERE = ("chart_plan", "chart_sigma", "chart_error", "page", "holds", "fails", "Points")

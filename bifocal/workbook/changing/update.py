@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bifocal.remarks import remark
-from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey import SurveyInput
 from bifocal.workbook.changing.kinds import check_kind
 from bifocal.workbook.changing.setup_update import (
     add_missing_sheets,
@@ -27,25 +27,35 @@ from bifocal.workbook.making.book import UNPRINTED, build, unprinted_formula
 from bifocal.workbook.making.charts import HEAD, LEFT
 from bifocal.workbook.words import word
 from photocore.errors import InputError
-from photocore.workbook.changing.cells import CellValue, NewColumn, escape
-from photocore.workbook.changing.editor import WorkbookEditor
-from photocore.workbook.changing.named_cells import place_of, type_column, type_value
-from photocore.workbook.changing.plain import MARK, PlainEditor
-from photocore.workbook.changing.settling import Settling, changed_formulas, normal
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.making.live_columns import TEXT_KEYS, row_formula
-from photocore.workbook.making.newbook import RowBlock
-from photocore.workbook.making.print_area import move_print_area
-from photocore.workbook.making.repeated_rows import column_places, named_columns, short_formula
-from photocore.workbook.reading.grid import (
+from photocore.workbook import (
+    MARK,
+    TEXT_KEYS,
+    BookBuilder,
+    CellValue,
+    NewColumn,
+    PlainEditor,
+    RowBlock,
+    Settling,
     TableArea,
     Value,
+    WorkbookEditor,
+    changed_formulas,
     column_letters,
+    column_places,
+    escape,
+    move_print_area,
+    named_columns,
+    normal,
+    place_of,
     plain_title,
+    row_formula,
+    short_formula,
     split_area,
     split_cell,
+    type_column,
+    type_value,
+    uncollected,
 )
-from photocore.workbook.reading.package import uncollected
 
 #: Tables whose rows are given, and the columns that tell whether they still are those.
 _FIXED = (

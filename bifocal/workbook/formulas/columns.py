@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bifocal.model.flags import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
-from bifocal.survey.georeferencing import ALPHA_POINT
-from bifocal.survey.observations import DOUBT_CODES
-from bifocal.survey.other_photos import CHANCE, TURNS
+from bifocal.model import DOUBTFUL_SHARE, UNCOUNTED, FlagLimits
+from bifocal.survey import ALPHA_POINT, CHANCE, DOUBT_CODES
+from bifocal.survey.other_photos import TURNS
 from bifocal.workbook.formulas.placed_formulas import placed_parts
-from photocore.workbook.making.live_columns import FormulaBook, LiveColumn
+from photocore.workbook import FormulaBook, LiveColumn
 
 FORMULAS = FormulaBook(__package__)
 #: The functions with names of `bifocal template --functions`, a table each.

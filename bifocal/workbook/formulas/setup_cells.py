@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from bifocal.model.flags import SIGMA_PIXEL, UNCERTAIN_SHARE
-from bifocal.model.hypotheses import SCALE_TOLERANCE
-from bifocal.model.photo import LEAST_COSINE
+from bifocal.model import LEAST_COSINE, SCALE_TOLERANCE, SIGMA_PIXEL, UNCERTAIN_SHARE
 from bifocal.options.commands import SolveCommand
-from bifocal.survey.setup import SIGMA_PRINT, SIGMA_RADIAL
-from bifocal.survey.survey_media import HEIGHTS, index_names, media_names, thickness_names
+from bifocal.survey import (
+    HEIGHTS,
+    SIGMA_PRINT,
+    SIGMA_RADIAL,
+    index_names,
+    media_names,
+    thickness_names,
+)
 from bifocal.workbook.formulas.columns import FORMULAS, other_numbers
 from photocore.option_types import Number
 from photocore.options import options_of

@@ -14,9 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifocal.workbook.formulas.placed_formulas import entry
-from photocore.workbook.making.live_book import SheetBuilder
-from photocore.workbook.making.look import LABEL_FONT
-from photocore.workbook.reading.grid import column_letters
+from photocore.workbook import LABEL_FONT, SheetBuilder, column_letters
 
 #: First column, right of the table of control points; first row, that nine stand above its keys.
 LEFT, TOP = 72, 3

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.survey.remarks import SCALE_SHARE, WIDEST_ANGLE
-from bifocal.survey.taped import TAPED_SIGMAS
+from bifocal.model import FARTHEST_WALL
+from bifocal.survey import SCALE_SHARE, TAPED_SIGMAS, WIDEST_ANGLE
 from bifocal.workbook.formulas.columns import FORMULAS
 
 #: Names of the cells that judge the world coordinates, and what was measured on site.

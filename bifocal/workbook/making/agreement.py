@@ -10,8 +10,7 @@ from bifocal.remarks import remark
 from bifocal.workbook.content import SurveyContent
 from photocore.arrays import FloatArray
 from photocore.errors import InputError
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder
+from photocore.workbook import BookBuilder, CellValue
 
 #: Numbers that differ by less are alike: of what is above 1, and of what is uncertain in a number.
 ALIKE = 1e-9

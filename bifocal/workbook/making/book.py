@@ -7,7 +7,7 @@ from pathlib import Path
 
 from openpyxl.styles import Alignment, Protection
 
-from bifocal.survey.other_photos import CHANCE
+from bifocal.survey import CHANCE
 from bifocal.workbook.content import STRUCTURED_ROWS, SurveyContent, point_cells, printed_rows
 from bifocal.workbook.formulas.columns import FORMULAS, planning_facts, results_columns
 from bifocal.workbook.formulas.world_state import SITE, STATE, sentence
@@ -21,9 +21,7 @@ from bifocal.workbook.making.reference_sheets import check, planning
 from bifocal.workbook.making.setup_sheet import setup_sheet
 from bifocal.workbook.making.what_if_sheet import what_if_sheet
 from bifocal.workbook.words import WORDS, word
-from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.making.look import (
+from photocore.workbook import (
     BODY_FONT,
     DOUBT,
     GOOD,
@@ -31,12 +29,16 @@ from photocore.workbook.making.look import (
     NOTE_FONT,
     WARN_FONT,
     WRONG,
+    BookBuilder,
+    Cells,
+    LiveColumn,
+    SheetBuilder,
     colour_where,
     colour_words,
+    column_letters,
+    name_columns,
     strike_out,
 )
-from photocore.workbook.making.repeated_rows import name_columns
-from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys in `Points` and `Results`.
 HEAD = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from photocore.workbook.making.sketch import Place, Sketch
+from photocore.workbook import Place, Sketch
 
 #: Colours that the colour-blind tell apart (Okabe and Ito); dashes and symbols say the same.
 FAR, NEAR, POINT, INK, FAINT = "0072B2", "D55E00", "009E73", "222222", "777777"

@@ -13,12 +13,21 @@ from bifocal.workbook.content import CHART_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import FORMULAS
 from bifocal.workbook.making.reference_sheets import CHECK_HEAD
 from bifocal.workbook.words import word
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder, Cells, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, bars, scatter, titled
-from photocore.workbook.making.look import FACE, LABEL, LABEL_FONT
-from photocore.workbook.making.newbook import RowBlock
-from photocore.workbook.reading.grid import column_letters
+from photocore.workbook import (
+    COLOURS,
+    FACE,
+    LABEL,
+    LABEL_FONT,
+    BookBuilder,
+    Cells,
+    CellValue,
+    RowBlock,
+    SheetBuilder,
+    bars,
+    column_letters,
+    scatter,
+    titled,
+)
 
 #: Row of the headings of the chart data; text would break a scatter chart, so blanks are #N/A.
 HEAD = 4

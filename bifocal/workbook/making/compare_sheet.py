@@ -8,9 +8,7 @@ from bifocal.workbook.content import CHECK_ROWS, SurveyContent
 from bifocal.workbook.formulas.columns import compare_columns, compared
 from bifocal.workbook.making.reference_sheets import statistics_of
 from bifocal.workbook.making.setup_sheet import pair_names
-from photocore.workbook.making.live_book import BookBuilder
-from photocore.workbook.making.look import HEAD_FONT
-from photocore.workbook.reading.grid import column_letters
+from photocore.workbook import HEAD_FONT, BookBuilder, column_letters
 
 #: Row of the keys of the table; statistics stand above.
 HEAD = 11

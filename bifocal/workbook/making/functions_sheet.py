@@ -14,10 +14,15 @@ from openpyxl.styles import Alignment, Font
 from openpyxl.worksheet.formula import ArrayFormula
 
 from bifocal.workbook.formulas.columns import FUNCTIONS
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.making.look import HEAD_FONT, NOTE_FONT, ROW_HEIGHT
-from photocore.workbook.making.words import Wording
+from photocore.workbook import (
+    HEAD_FONT,
+    NOTE_FONT,
+    ROW_HEIGHT,
+    BookBuilder,
+    LiveColumn,
+    SheetBuilder,
+    Wording,
+)
 
 _GIVEN = re.compile(r"\[@(\w+)\]")
 #: Characters in a line of column B.

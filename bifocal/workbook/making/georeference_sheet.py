@@ -6,16 +6,23 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bifocal.survey.remarks import LARGEST_RESIDUAL, SCALE_SHARE
+from bifocal.survey import LARGEST_RESIDUAL, SCALE_SHARE
 from bifocal.survey.weighted_similarity import TURNS
 from bifocal.workbook.content import SurveyContent, control_cells
 from bifocal.workbook.formulas.columns import FORMULAS, georeference_columns
 from bifocal.workbook.formulas.space_block import STEP_FORM, SpaceBlock
 from bifocal.workbook.formulas.world_state import STATE, sentence
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_columns import LiveColumn
-from photocore.workbook.making.look import HEAD_FONT, LABEL_FONT, NOTE_FONT, WRONG, colour_where
-from photocore.workbook.reading.grid import column_letters
+from photocore.workbook import (
+    HEAD_FONT,
+    LABEL_FONT,
+    NOTE_FONT,
+    WRONG,
+    BookBuilder,
+    LiveColumn,
+    SheetBuilder,
+    colour_where,
+    column_letters,
+)
 
 #: Row of the keys of the control points; model and parameters stand above.
 CONTROL_HEAD = 12

@@ -7,8 +7,7 @@ from openpyxl.worksheet.pagebreak import Break
 from bifocal.workbook.content import SurveyContent
 from bifocal.workbook.making.cameras_sketch import SIZE, cameras_sketch, hand_sketch
 from bifocal.workbook.words import WORDS, readme
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.look import HEAD_FONT, ROW_HEIGHT
+from photocore.workbook import HEAD_FONT, ROW_HEIGHT, BookBuilder, SheetBuilder
 
 #: Printed rows of the first page, where the second begins, and the height of its drawing. [pt]
 _ROWS, _SECOND, _DRAWN = 34, 37, 300.0

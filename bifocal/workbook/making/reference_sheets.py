@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from openpyxl.styles import Alignment
 
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.survey.taped import TAPE
-from bifocal.survey.tolerances import judge
+from bifocal.model import FARTHEST_WALL
+from bifocal.survey import TAPE, judge
 from bifocal.workbook.content import CHECK_ROWS, SurveyContent, check_cells
 from bifocal.workbook.formulas.columns import (
     FORMULAS,
@@ -18,18 +17,19 @@ from bifocal.workbook.formulas.columns import (
 )
 from bifocal.workbook.formulas.world_state import SITE, sentence
 from bifocal.workbook.words import word
-from photocore.workbook.changing.cells import name_cell
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.look import (
+from photocore.workbook import (
     DOUBT,
     GOOD,
     HEAD_FONT,
     NOTE_FONT,
     WRONG,
+    BookBuilder,
+    SheetBuilder,
     colour_where,
     colour_words,
+    column_letters,
+    name_cell,
 )
-from photocore.workbook.reading.grid import column_letters
 
 #: Row of the keys of the check table; statistics stand above.
 CHECK_HEAD = 12

@@ -22,9 +22,16 @@ from bifocal.workbook.formulas.setup_cells import (
     state_formula,
 )
 from bifocal.workbook.words import term, word
-from photocore.workbook.changing.cells import CellValue
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.look import GOOD, HEAD_FILL, HEAD_FONT, WRONG, colour_words
+from photocore.workbook import (
+    GOOD,
+    HEAD_FILL,
+    HEAD_FONT,
+    WRONG,
+    BookBuilder,
+    CellValue,
+    SheetBuilder,
+    colour_words,
+)
 
 #: What a typed number of the set-up may be, where it need not be above zero.
 _NUMBERS = (-1e7, 1e7)

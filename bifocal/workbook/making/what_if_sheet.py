@@ -8,9 +8,7 @@ from openpyxl.styles import Alignment
 from bifocal.workbook.content import CHART_ROWS, SurveyContent, printed_rows
 from bifocal.workbook.formulas.columns import CHANGED, FORMULAS
 from bifocal.workbook.formulas.setup_cells import number_format
-from photocore.workbook.making.live_book import BookBuilder, SheetBuilder
-from photocore.workbook.making.live_charts import COLOURS, bars, scatter
-from photocore.workbook.reading.grid import column_letters
+from photocore.workbook import COLOURS, BookBuilder, SheetBuilder, bars, column_letters, scatter
 
 #: Rows of the changes, of the charts, and of the keys of the table.
 FIRST, CHARTS, HEAD = 5, 12, 30

@@ -8,13 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.orientation.control_lists import lacks_axis, of_rows, strange_third, without_unseen
-from bifocal.orientation.control_points import A_PHOTO
+from bifocal.model import FARTHEST_WALL
+from bifocal.orientation import A_PHOTO, lacks_axis, of_rows, strange_third, without_unseen
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations, pixel_keys
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.survey_input import SurveyInput
+from bifocal.survey import KnownPoints, PointObservations, SurveyInput, pixel_keys
 from bifocal.workbook.reading.reader import TO_M, understood
 from bifocal.workbook.reading.setup_reader import LARGEST
 from photocore.arrays import FloatArray

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations
+from bifocal.survey import PointObservations
 from bifocal.workbook.reading.reader import TO_MM
 from bifocal.workbook.reading.setup_reader import LARGEST
 from photocore.arrays import FloatArray

@@ -10,10 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations, pixel_keys
-from bifocal.survey.reference import KnownPoints
-from bifocal.survey.survey_input import SurveyInput, where_of, with_measured
-from bifocal.survey.taped import TAPE, TapedDistance
+from bifocal.survey import (
+    TAPE,
+    KnownPoints,
+    PointObservations,
+    SurveyInput,
+    TapedDistance,
+    pixel_keys,
+    where_of,
+    with_measured,
+)
 from bifocal.workbook.formulas.columns import other_keys
 from bifocal.workbook.reading.row_checks import PIXELS, POLAR, XY, check_rows
 from bifocal.workbook.reading.setup_reader import (
@@ -38,9 +44,7 @@ from photocore.tables.csvread import CsvFile
 from photocore.tables.heading_words import bare
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.making.live_columns import TEXT_KEYS
-from photocore.workbook.reading.grid import SheetFile
-from photocore.workbook.reading.package import uncollected
+from photocore.workbook import TEXT_KEYS, SheetFile, uncollected
 
 #: Units expected where neither heading nor cell says one; that of x1..y2 depends on `Setup`.
 _UNITS = {"theta": "deg", "r_measured": "m", "s1": "mm", "s2": "mm"} | dict.fromkeys(PIXELS, "px")

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bifocal.remarks import remark
-from bifocal.survey.observations import PointObservations, pixel_keys
+from bifocal.survey import PointObservations, pixel_keys
 from photocore.errors import CellError
 from photocore.tables import Table
-from photocore.workbook.making.live_columns import TEXT_KEYS
+from photocore.workbook import TEXT_KEYS
 
 XY, POLAR = ("x1", "y1", "x2", "y2"), ("s1", "s2", "theta")
 PIXELS = ("col1", "row1", "col2", "row2")

@@ -10,17 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.photo import LEAST_COSINE
+from bifocal.model import LEAST_COSINE
 from bifocal.remarks import remark
-from bifocal.survey.other_photos import MOST_PHOTOS
-from bifocal.survey.setup import Measuring, OtherPhoto, SurveySetup, Taking
-from bifocal.survey.survey_lens import SurveyLens
-from bifocal.survey.survey_media import (
+from bifocal.survey import (
     FEWEST,
     HEIGHTS,
     MOST,
+    MOST_PHOTOS,
     NORMALS,
+    Measuring,
+    OtherPhoto,
+    SurveyLens,
     SurveyMedia,
+    SurveySetup,
+    Taking,
     index_names,
     media_names,
     thickness_names,
@@ -46,7 +49,7 @@ from photocore.tables import Column, NamedValues, read_named_values
 from photocore.tables.csvread import CsvFile
 from photocore.tables.model import Kind
 from photocore.tables.numbers import Decimal
-from photocore.workbook.reading.grid import (
+from photocore.workbook import (
     SheetFile,
     cell_name,
     fixed_cell,

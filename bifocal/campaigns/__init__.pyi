@@ -1,0 +1,15 @@
+from .pair_job import PairOutcome as PairOutcome
+from .pair_steps import PairJob as PairJob
+from .pair_steps import proven as proven
+from .rectification import rectify_photo as rectify_photo
+from .survey_file import in_survey_words as in_survey_words
+from .survey_file import mosaic_wanted as mosaic_wanted
+from .survey_file import read_survey_file as read_survey_file
+from .verification import verify as verify
+from .workflow import Machines as Machines
+from .workflow import begin_survey as begin_survey
+from .workflow import facade as facade
+from .workflow import facade_job as facade_job
+from .workflow import pairs_in_words as pairs_in_words
+from .workflow import plan_survey as plan_survey
+from .workflow import run_survey as run_survey

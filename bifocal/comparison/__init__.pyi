@@ -1,0 +1,1 @@
+from .workflow import compare_files as compare_files

@@ -1,0 +1,14 @@
+from .faced_surface import FacedSurface as FacedSurface
+from .faced_surface import beneath as beneath
+from .faced_surface import faced as faced
+from .faces import BreakLine as BreakLine
+from .faces import Face as Face
+from .faces import Faces as Faces
+from .faces import Occluder as Occluder
+from .faces_files import beside as beside
+from .faces_files import check_faces as check_faces
+from .faces_files import faces_path as faces_path
+from .faces_files import given_faces as given_faces
+from .faces_files import keep_faces as keep_faces
+from .faces_files import read_faces as read_faces
+from .suggestions import suggest_faces as suggest_faces

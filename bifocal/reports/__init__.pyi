@@ -1,0 +1,16 @@
+from .accuracy import precision_in_words as precision_in_words
+from .accuracy import verdict_in_words as verdict_in_words
+from .accuracy import wall_in_words as wall_in_words
+from .content import ortho_thumbnail as ortho_thumbnail
+from .content import read_content as read_content
+from .control_survey import is_exchanged as is_exchanged
+from .control_survey import refuse_same_names as refuse_same_names
+from .control_survey import solve_control as solve_control
+from .handover import HandoverTask as HandoverTask
+from .handover import write_handover as write_handover
+from .view_workflow import view_relief as view_relief
+from .worked_point import WorkedPoint as WorkedPoint
+from .worked_point import recomputed as recomputed
+from .workflow import StepTold as StepTold
+from .workflow import report_of as report_of
+from .workflow import write_report as write_report

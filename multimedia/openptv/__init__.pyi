@@ -1,0 +1,11 @@
+from .chance_counts import ChanceCounts as ChanceCounts
+from .chance_counts import narrower_counts as narrower_counts
+from .chance_counts import tolerance_remarks as tolerance_remarks
+from .correspondences import TOLERANCE as TOLERANCE
+from .openptv_files import read_blobs as read_blobs
+from .openptv_files import read_targets as read_targets
+from .openptv_files import rt_is_text as rt_is_text
+from .openptv_files import targets_text as targets_text
+from .particles_workflow import find_particles as find_particles
+from .workflow import export_openptv as export_openptv
+from .workflow import import_openptv as import_openptv

@@ -1,0 +1,13 @@
+from .colmap import CORNER as CORNER
+from .colmap import camera_words as camera_words
+from .colmap import digits as digits
+from .colmap import image_words as image_words
+from .colmap import is_colmap as is_colmap
+from .colmap import read_colmap_model as read_colmap_model
+from .colmap import write_colmap_model as write_colmap_model
+from .metashape import FRAME as FRAME
+from .metashape import read_metashape_project as read_metashape_project
+from .model import ForeignProject as ForeignProject
+from .model import ForeignView as ForeignView
+from .photos import PhotoFinder as PhotoFinder
+from .projects import read_foreign_project as read_foreign_project

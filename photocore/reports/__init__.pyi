@@ -1,0 +1,16 @@
+from .document import Banner as Banner
+from .document import Block as Block
+from .document import Document as Document
+from .document import Heading as Heading
+from .document import Paragraph as Paragraph
+from .document import Picture as Picture
+from .document import TextTable as TextTable
+from .figure_file import write_figure as write_figure
+from .framing import dated_document as dated_document
+from .framing import provenance_blocks as provenance_blocks
+from .html_page import provenance_text as provenance_text
+from .words import Words as Words
+from .words import texts_of as texts_of
+from .words import words_of as words_of
+from .writing import check_report as check_report
+from .writing import write_document as write_document
