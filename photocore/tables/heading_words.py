@@ -100,31 +100,32 @@ def forms_of(variants: Sequence[str]) -> list[str]:
     >>> forms_of(["x [px]"])  # no coordinate on the wall
     ['pixelx']
     """
-    forms = []
-    for text in variants:
-        if bare(text) in ("x", "y") and unit_of(text) == "px":
-            text = f"pixel {bare(text)}"
-        directed = _DIRECTED.fullmatch(text)
-        if directed and directed[1].casefold() in _DIRECTIONS:
-            text = directed[1]
-        form = bare(text)
-        if form and form not in forms:
-            forms.append(form)
-        loose = bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
-        if loose and loose not in forms:
-            forms.append(loose)
+    forms = [*dict.fromkeys(form for text in variants for form in _forms(text))]
     return forms or [""]
 
 
-def parts_of(text: str) -> set[str]:
+@lru_cache(maxsize=10_000)
+def _forms(text: str) -> tuple[str, ...]:
+    """Return the bare forms of one heading, none empty: as it is, and without a unit at its end."""
+    if bare(text) in ("x", "y") and unit_of(text) == "px":
+        text = f"pixel {bare(text)}"
+    directed = _DIRECTED.fullmatch(text)
+    if directed and directed[1].casefold() in _DIRECTIONS:
+        text = directed[1]
+    forms = bare(text), bare(_LOOSE_UNIT.sub("", _UNIT.sub("", text).strip()))
+    return tuple(filter(None, forms))
+
+
+@lru_cache(maxsize=10_000)
+def parts_of(text: str) -> frozenset[str]:
     """Return bare forms of what a heading says besides itself: sides of a slash, less a datum.
 
-    >>> sorted(parts_of("X/Easting")), parts_of("Höhe m ü. NN"), parts_of("Point Elevation [m]")
-    (['easting', 'x'], {'höhe'}, {'elevation'})
+    >>> [sorted(parts_of(text)) for text in ("X/Easting", "Höhe m ü. NN", "Point Elevation [m]")]
+    [['easting', 'x'], ['höhe'], ['elevation']]
     >>> parts_of("Accuracy_X/Y/Z_(m)")
-    set()
+    frozenset()
     """
     whole = _UNIT.sub("", text).strip()
     sides = whole.split("/") if whole.count("/") == 1 and not _PRECISION.match(whole) else []
     plain = _PREFIX.sub("", _DATUM.sub("", whole))
-    return {bare(part) for part in (*sides, plain)} - {"", bare(text)}
+    return frozenset(map(bare, (*sides, plain))) - {"", bare(text)}

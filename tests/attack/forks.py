@@ -9,6 +9,7 @@ path, ``closed`` or ``pipe`` without a reader), ``stdin`` (``closed``), ``home``
 from __future__ import annotations
 
 import codecs
+import gc
 import io
 import json
 import os
@@ -126,6 +127,7 @@ def main() -> None:
     for name in ("tomli_w", "ezdxf", "statistics"):  # loaded when a file of theirs is written
         import_module(name)
     Image.init()
+    gc.freeze()  # a child would copy all memory that it looks through for garbage
     with tempfile.TemporaryDirectory() as name:
         for line in sys.stdin:
             sys.__stdout__.write(json.dumps(run(json.loads(line), Path(name))) + "\n")

@@ -22,7 +22,7 @@ from click.testing import CliRunner
 from tests.attack.contents import CONTENTS
 from tests.attack.lines import ALIGN, CURVE, INPUTS, OUTPUTS, SOLVE, WATER
 from tests.attack.options import WORDS
-from tests.attack.site import PROGRAMS, make_site
+from tests.attack.site import PROGRAMS
 from tests.tables import each
 
 #: A message must say how to mend it: what was expected, what to do, or that a thing is not there.
@@ -35,13 +35,6 @@ REMEDY = re.compile(
     r"|say how|take|to 30|too |twice|two prop|use |would be|write|written",
     re.IGNORECASE,
 )
-
-
-@pytest.fixture(scope="module")
-def whole_site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("site")
-    make_site(folder)
-    return folder
 
 
 @pytest.fixture

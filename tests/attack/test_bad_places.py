@@ -22,7 +22,6 @@ import pytest
 
 from photocore.interrupts import STOPPED
 from tests.attack.lines import OUTPUTS, SOLVE
-from tests.attack.site import make_site
 from tests.attack.test_bad_inputs import state
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks processes")
@@ -48,16 +47,9 @@ def run() -> Iterator[Run]:
     process.communicate()
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("site")
-    make_site(folder)
-    return folder
-
-
 @pytest.fixture
-def site(whole: Path, tmp_path: Path) -> Path:
-    shutil.copytree(whole, tmp_path / "site", copy_function=os.link)
+def site(whole_site: Path, tmp_path: Path) -> Path:
+    shutil.copytree(whole_site, tmp_path / "site", copy_function=os.link)
     return tmp_path / "site"
 
 
@@ -149,7 +141,7 @@ def test_json_is_json_whatever_letters_stdout_lacks(run: Run, site: Path) -> Non
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["kill", "interrupt"])
 @pytest.mark.parametrize(("line", "ending"), WRITING, ids=IDS)
 def test_killed_at_any_moment_nothing_is_half_written(
-    run: Run, whole: Path, tmp_path: Path, line: str, ending: str, number: int
+    run: Run, whole_site: Path, tmp_path: Path, line: str, ending: str, number: int
 ) -> None:
     """Random moments; the output is its old or its whole new self, the rest untouched.
 
@@ -161,13 +153,13 @@ def test_killed_at_any_moment_nothing_is_half_written(
     name = "o" + ending
     words = f"{line.replace('{}', name)} --overwrite"
     site = tmp_path / "site"
-    shutil.copytree(whole, site, copy_function=os.link)
+    shutil.copytree(whole_site, site, copy_function=os.link)
     start = time.monotonic()
     assert run(words, site)["status"] == 0
     length = time.monotonic() - start
     new = sizes_of(site / name)
     is_folder = (site / name).is_dir()
-    inputs = state(whole)
+    inputs = state(whole_site)
     for moment in range(3):
         after = rng.uniform(0 if moment % 2 else 0.7 * length, 1.1 * length)
         if is_folder:
