@@ -4,6 +4,7 @@ from .diagnostics import ControlResidual as ControlResidual
 from .diagnostics import Diagnostics as Diagnostics
 from .diagnostics import TieCells as TieCells
 from .diagnostics import WallZone as WallZone
+from .diagnostics import deviations_by_photo as deviations_by_photo
 from .doubts import CERTAIN as CERTAIN
 from .doubts import LENGTHS as LENGTHS
 from .doubts import METRES as METRES

@@ -79,3 +79,11 @@ class Diagnostics(TypedDict, total=False):
     control: list[ControlResidual]
     lengths: list[Mapping[str, Any]]
     length_checks: list[CheckedLength]
+
+
+def deviations_by_photo(setup: Diagnostics) -> list[dict[str, float | None]]:
+    """Return the standard deviations that a pair's file states as a set's file names them."""
+    keys = {"distance": "distance{}", "nadir": "nadir{}", "tilt_deg": "tilt{}_deg",
+            "focal_px": "focal{}"}  # fmt: skip
+    sigmas: Any = setup.get("standard_deviations", {})
+    return [{key: sigmas.get(name.format(n)) for key, name in keys.items()} for n in (1, 2)]

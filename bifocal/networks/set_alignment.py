@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.diagnostics import Diagnostics
+from bifocal.model.diagnostics import Diagnostics, deviations_by_photo
 from bifocal.model.image import as_grey
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA, moved
@@ -16,9 +17,10 @@ from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo_set import PhotoSet
 from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import OrientedSet, orient_set
-from bifocal.orientation.alignment import facade_axes, lens_of, photo_of
+from bifocal.orientation.alignment import Alignment, facade_axes, lens_of, photo_of
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
+from bifocal.orientation.photo_alignment import align
 from bifocal.orientation.tuning import REMARKS
 from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
@@ -39,7 +41,9 @@ class SetAlignment:
     way : str
         ``control``, ``site`` or ``auto``.
     setup : mapping
-        Diagnostics for the file.
+        Diagnostics for the file; of two photos those of their pair.
+    deviations : sequence of mapping
+        Standard deviations of each camera: ``distance``, ``nadir`` [m], ``tilt_deg``, ``focal_px``.
     words : tuple of str
         The set-up in sentences.
     remarks : tuple of str
@@ -49,8 +53,20 @@ class SetAlignment:
     photos: PhotoSet
     way: str
     setup: Diagnostics
+    deviations: Sequence[Mapping[str, float | None]]
     words: tuple[str, ...]
     remarks: tuple[str, ...]
+
+    @classmethod
+    def of_pair(cls, alignment: Alignment) -> Self:
+        """Return two photos as their pair has them, in the order in which they were given."""
+        order = (1, 0) if alignment.exchanged else (0, 1)
+        deviations = deviations_by_photo(alignment.setup)
+        return cls(
+            photos=PhotoSet.from_pair(alignment.pair).only(order), way=alignment.way,
+            setup=alignment.setup, deviations=[deviations[k] for k in order],
+            words=alignment.words, remarks=alignment.remarks,
+        )  # fmt: skip
 
 
 def align_set(
@@ -88,13 +104,18 @@ def align_set(
 
     Notes
     -----
-    The best pair is oriented as by `align`, further photos by space resection; then control
-    points, distances, lengths, the wall, the lenses and the rays of points that two or more photos
-    share enter one least-squares adjustment. Photos of one lens share its unknowns.
+    Two photos are what `align` makes of them. Of more the best pair is oriented as by `align`,
+    further photos by space resection; then control points, distances, lengths, the wall, the
+    lenses and the rays of points that two or more photos share enter one least-squares
+    adjustment. Photos of one lens share its unknowns.
     """
-    control, site = control or Control(), site or SiteMeasures()
     if len(images) != len(interiors) or len(images) < 2:
         raise InputError(f"{len(images)} images and {len(interiors)} interiors: one for each.")
+    if len(images) == 2:
+        lenses = interiors[0], interiors[1]
+        pair = align(images[0], images[1], interiors=lenses, control=control, site=site)
+        return SetAlignment.of_pair(pair)
+    control, site = control or Control(), site or SiteMeasures()
     photos = [
         PhotoInput(grey=as_grey(image, f"image{k}"), interior=interior, name=f"photo {k}")
         for k, (image, interior) in enumerate(zip(images, interiors, strict=True), start=1)
@@ -169,7 +190,7 @@ def set_alignment(
     }  # fmt: skip
     return SetAlignment(
         photos=PhotoSet(photos=aligned, orientation=covariance), way=oriented.way, setup=setup,
-        words=words, remarks=remarks,
+        deviations=setup["standard_deviations"], words=words, remarks=remarks,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from bifocal.networks.set_alignment import SetAlignment, set_alignment
 from bifocal.networks.set_orientation import orient_set
 from bifocal.orientation.align_workflow import (
     AlignOptions,
+    aligned_photos,
     check_metres,
     control_of,
     interior_of_photo,
@@ -58,6 +59,11 @@ def align_photo_set(
             f"{out.name}: the file of a set of photos ends in {ENDING}; write --out "
             f"{out.name.partition('.')[0]}{ENDING}, or give two photos for a pair file."
         )
+    if len(paths) == 2:
+        pair = aligned_photos(paths[0], paths[1], out, options, overwrite=overwrite)
+        alignment = SetAlignment.of_pair(pair)
+        alignment.photos.write(out, overwrite=overwrite)
+        return alignment
     way, options = way_of_set(options)
     twice = [path for k, path in enumerate(paths) if path.resolve() in
              {earlier.resolve() for earlier in paths[:k]}]  # fmt: skip
@@ -115,11 +121,10 @@ def set_as_dict(alignment: SetAlignment) -> dict[str, Any]:
         "way": alignment.way,
         "photos": [
             {"name": photo.name, "distance": photo.distance, "nadir": photo.nadir, **spread}
-            for photo, spread in zip(
-                alignment.photos.photos, alignment.setup["standard_deviations"], strict=True
-            )
+            for photo, spread in zip(alignment.photos.photos, alignment.deviations, strict=True)
         ],
-        **{key: alignment.setup[key] for key in ("common_points", "sigma0", "control", "assumed")},
+        **{key: alignment.setup[key] for key in ("common_points", "sigma0", "assumed")},
+        "control": alignment.setup.get("control", []),
         "lengths": alignment.setup.get("length_checks", []),
         "words": alignment.words,
         "remarks": alignment.remarks,

@@ -177,6 +177,21 @@ def align_photos(
     """
     if out.suffix.lower() != ".json":
         raise InputError(remark("align.pair_ending", of=out.name, stem=out.stem))
+    alignment = aligned_photos(far, near, out, options, picture=picture, overwrite=overwrite)
+    alignment.pair.write(out, overwrite=overwrite)
+    return alignment
+
+
+def aligned_photos(
+    far: Path,
+    near: Path,
+    out: Path,
+    options: AlignOptions,
+    *,
+    picture: Path | None = None,
+    overwrite: bool = False,
+) -> Alignment:
+    """Return the pair as `align_photos`, with all files written but its own, ``out``."""
     check_ending(picture, "a picture is written as .png, .jpg or .tif.", *WRITTEN)
     way, options = way_of(options)
     check_metres(options)
@@ -228,9 +243,7 @@ def align_photos(
         photo=2 if oriented.exchanged else 1,
     )  # fmt: skip
     alignment = replace(alignment, setup=setup, remarks=(*wrong, *alignment.remarks))
-    alignment = with_files(alignment, names, lenses)
-    alignment.pair.write(out, overwrite=overwrite)
-    return alignment
+    return with_files(alignment, names, lenses)
 
 
 def alignment_as_dict(alignment: Alignment) -> dict[str, object]:
@@ -484,7 +497,7 @@ def _write_lenses(
     alignment: Alignment, out: Path, *, overwrite: bool
 ) -> tuple[str | None, str | None]:
     """Write the lens files the pair needs beside it and return their names."""
-    stem = out.name.removesuffix(".json").removesuffix(".pair")
+    stem = out.name.removesuffix(".json").removesuffix(".pair").removesuffix(".photos")
     names: list[str | None] = [None, None]
     for index, photo in enumerate((alignment.pair.image1, alignment.pair.image2)):
         if photo.lens is not None:

@@ -64,6 +64,8 @@ class Alignment:
         The set-up in sentences.
     remarks : tuple of str
         What the user should be warned of.
+    exchanged : bool
+        Whether the photos were given the other way round.
     """
 
     pair: Pair
@@ -80,6 +82,7 @@ class Alignment:
     setup: Diagnostics
     words: tuple[str, ...]
     remarks: tuple[str, ...] = ()
+    exchanged: bool = False
 
 
 def make_alignment(
@@ -147,6 +150,7 @@ def make_alignment(
         setup=_diagnostics(oriented, cameras, deviations, way, words, sigma_tie),
         words=words,
         remarks=oriented.remarks,
+        exchanged=oriented.exchanged,
     )
 
 

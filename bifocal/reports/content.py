@@ -25,6 +25,7 @@ from bifocal.model import (
     RasterReader,
     ReliefMap,
     check_scale,
+    deviations_by_photo,
     pair_or_set,
 )
 from bifocal.options import defaults_of, typed
@@ -199,16 +200,11 @@ class PairContent:
         return self.pair.orientation if self.of_set is None else self.of_set.orientation
 
     @property
-    def deviations(self) -> Sequence[Mapping[str, float]]:
+    def deviations(self) -> Sequence[Mapping[str, float | None]]:
         """Standard deviations of each camera by the keys of a set's file, where known."""
-        sigmas: Any = self.setup.get("standard_deviations", {})
-        if self.of_set is not None:
-            return sigmas or [{}] * len(self.of_set)
-        keys = {"distance": "distance{}", "nadir": "nadir{}", "tilt_deg": "tilt{}_deg",
-                "focal_px": "focal{}"}  # fmt: skip
-        return [
-            {key: sigmas.get(pattern.format(n)) for key, pattern in keys.items()} for n in (1, 2)
-        ]
+        if self.of_set is None:
+            return deviations_by_photo(self.setup)
+        return self.setup.get("standard_deviations") or [{}] * len(self.of_set)
 
     def names(self, say: Words) -> tuple[str, ...]:
         """Return what the photos are called."""

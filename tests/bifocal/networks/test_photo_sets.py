@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,11 @@ from bifocal import (
     InputError,
     Interior,
     Lens,
+    Pair,
     PhotoSet,
     Pinhole,
+    SetAlignment,
+    align,
     align_set,
     read_control,
     read_image,
@@ -249,6 +253,65 @@ def test_three_photos_in_any_order_become_a_set_its_points_and_report(three, mon
     again = CliRunner().invoke(main, line)
     assert "porch/align (kept)" in again.stdout
     assert "porch/report (kept)" in again.stdout
+
+
+def same_cameras(photos: PhotoSet, pair: Pair) -> None:
+    """Check that photos, the near one first, are those of a pair within a tenth of their sigma."""
+    sigma = np.sqrt(np.diag(pair.orientation)).reshape(2, -1)
+    its = pair.image2, pair.image1
+    for got, true, spread in zip(photos.photos, its, sigma[::-1, 7:10], strict=True):
+        off = np.array([*got.nadir - true.nadir, got.distance - true.distance])
+        assert (abs(off) < 0.1 * spread).all()
+    turned = np.sqrt(np.diag(photos.orientation)).reshape(2, -1)[::-1]
+    assert turned == pytest.approx(sigma, rel=0.01)
+
+
+def test_two_photos_are_the_set_that_their_pair_is():
+    """Near photo first: the set keeps that order, the pair has its far one first."""
+    rng = np.random.default_rng(3)
+    wall = rng.uniform((-2, -1.5, -0.4), (2, 1.5, 0.4), (12, 3))
+    square_on = np.diag([1.0, -1, -1])
+    cameras = [
+        Pinhole(camera_matrix(100 * z, 1.0, 200.0, 150.0), square_on, np.array([0.1, 0.0, z]))
+        for z in (17.5, 9.5)
+    ]
+    far, near = (project(one, wall) + rng.normal(0, 0.1, (12, 2)) for one in cameras)
+    lenses = [
+        Interior.from_focal(one.matrix[0, 0], image_size=(401, 301), sigma=5e-4, source="board")
+        for one in cameras
+    ]
+    control = Control(ids=tuple("ABCDEFGHIJKL"), xyz=wall, sigma=np.full((12, 3), 0.001),
+                      pixels1=far, pixels2=near)  # fmt: skip
+    pair = align(None, None, interiors=(lenses[0], lenses[1]), control=control).pair
+    given = align(None, None, interiors=(lenses[1], lenses[0]), control=control.exchanged())
+    made = SetAlignment.of_pair(given)
+    same_cameras(made.photos, pair)
+    for one, photo in zip(made.deviations, (2, 1), strict=True):
+        assert one["distance"] == given.setup["standard_deviations"][f"distance{photo}"]
+
+
+@pytest.mark.acceptance
+def test_two_photos_set_up_as_a_set_are_their_pair_file_and_report_it(three):
+    folder, _ = three
+    line = ["--control", "two.csv", "--pixel-size", "0.01", "--overwrite", "--out"]
+    with (folder / "set.csv").open(encoding="utf-8") as file:
+        rows = [(*row[:6], *row[8:]) for row in csv.reader(file)]
+    rows[0] = ("id", "X [m]", "Y [m]", "r [m]", "col1", "row1", "col2", "row2")
+    text = "\n".join(map(",".join, rows))
+    (folder / "two.csv").write_text(text.replace(",,", ","), encoding="utf-8")
+    focal = [f"{place / (2 * PIXEL) / 100:.6g}" for place in (9.5, 17.5)]
+    with chdir(folder):
+        for out in ("two.pair.json", "two.photos.json"):
+            photos = ["near.png", "far.png", "--focal1", focal[0], "--focal2", focal[1]]
+            result = CliRunner().invoke(main, ["align", *photos, *line, out])
+            assert result.exit_code == 0, result.output
+        result = CliRunner().invoke(main, ["report", "two.photos.json", "--out", "two.html"])
+        assert result.exit_code == 0, result.output
+    made, pair = PhotoSet.read(folder / "two.photos.json"), Pair.read(folder / "two.pair.json")
+    assert made.names == ("near", "far")
+    same_cameras(made, pair)
+    assert (made.pair().orientation == pair.orientation).all()
+    assert made.extra["setup"] == pair.extra["setup"]
 
 
 def test_a_set_is_refused_with_the_reason(three):
