@@ -61,7 +61,6 @@ def command(options: MatchCommand) -> None:
     matched along the radial lines. Every point is checked by how far off its line it fits.
     """
     from bifocal.matching import MatchSettings
-    from bifocal.survey import best_pair
     from bifocal.workbook import (
         is_workbook,
         match_photos,
@@ -75,7 +74,7 @@ def command(options: MatchCommand) -> None:
     if low is not None and high is not None and low >= high:
         raise click.UsageError("--relief-min must be below --relief-max.")
     photos, _ = set_or_pair(options.pair)
-    source = read_pair(options.pair) if photos is None else best_pair(photos)
+    source = read_pair(options.pair) if photos is None else photos.best_pair()
     reliefs = None
     if low is not None or high is not None:
         near = source.image2.distance

@@ -15,7 +15,6 @@ from bifocal.collimation.fields import NOTES, FieldError, fields_of
 from bifocal.files import photo_infos
 from bifocal.model import Pair, PhotoSet, pair_or_set
 from bifocal.remarks import remark
-from bifocal.survey import best_pair
 from bifocal.workbook import is_survey, read_pair, read_survey
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.images import READ, image_info
@@ -109,7 +108,7 @@ def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
     photos = pair_or_set(source)
     pair, shown = source, []
     if isinstance(photos, PhotoSet):
-        best, pair = best_pair(photos), _best_of(photos, source)
+        best, pair = photos.best_pair(), _best_of(photos, source)
         pair_photos = [best.photo_file(1), best.photo_file(2)]
         shown = [
             *pair_photos,
@@ -126,7 +125,7 @@ def _of_pair(source: Path, workbook: Path | None) -> SurveyFiles:
 
 def _best_of(photos: PhotoSet, source: Path) -> Path:
     """Return the file of a set's best pair, written beside it once."""
-    best = best_pair(photos)
+    best = photos.best_pair()
     photo_infos(best)  # what is not there, or another photo, is refused before a file is written
     stem = source.name.removesuffix(".json").removesuffix(".photos")
     named = file_name(f"{stem}-{best.image1.name}-{best.image2.name}")

@@ -20,7 +20,6 @@ from bifocal.model import NO_UNIT
 from bifocal.model.doubts import unit_of
 from bifocal.projects import ProjectOptions, photos_from_project, project_walls
 from bifocal.remarks import remark
-from bifocal.survey import best_pair
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.jsonfile import read_object, write_object
 from photocore.output import free_path
@@ -98,7 +97,7 @@ def open_wall(session: Session, number: int) -> None:
             overwrite=products.is_own(file),
         )  # fmt: skip
         photo_infos(project.photos)
-        pair = best_pair(project.photos)
+        pair = project.photos.best_pair()
         two = [pair.photo_file(1), pair.photo_file(2)]
         session.give_photos([*two, *(p.path for p in project.photos.photos if p.path not in two)])
         if unit_of(pair.extra) != NO_UNIT:

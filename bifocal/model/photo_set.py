@@ -262,6 +262,11 @@ class PhotoSet:
                 ranked.append((bool(np.median(apart) > WIDEST), -information, pair))
         return tuple(pair for *_, pair in sorted(ranked))
 
+    def best_pair(self) -> Pair:
+        """Return the pair that promises most of relief, else the first two photos."""
+        ranked = self.pairs()
+        return self.pair(ranked[0].far, ranked[0].near) if ranked else self.pair()
+
     def project(self, xyz: ArrayLike) -> tuple[FloatArray, ...]:
         """Return the pixels of points (X, Y, r) in every photo, each of shape (..., 2)."""
         return tuple(photo.project(xyz) for photo in self.photos)

@@ -31,7 +31,7 @@ from bifocal.model import (
 from bifocal.options import defaults_of, typed
 from bifocal.remarks import remark
 from bifocal.reports.control_survey import is_exchanged, solve_control
-from bifocal.survey import SolvedSurvey, best_pair
+from bifocal.survey import SolvedSurvey
 from bifocal.workbook import solve
 from photocore.arrays import ByteArray, FloatArray
 from photocore.errors import InputError, located
@@ -290,7 +290,7 @@ def read_content(source: Path, task: ReportTask, *, pictures: bool = True) -> Pa
             lists = setup.get("focal_px"), setup.get("standard_deviations")
             if not all(isinstance(values, list) and len(values) == len(of_set) for values in lists):
                 setup = None  # that of other photos, or of the project of another program
-        pair = best_pair(named) if isinstance(named, PhotoSet) else named
+        pair = named.best_pair() if isinstance(named, PhotoSet) else named
         if task.control or task.check:
             exchanged = task.far is not None and is_exchanged(named, task.far)
             solution = solve_control(

@@ -22,7 +22,6 @@ from .results import point_rows as point_rows
 from .results import shift_of as shift_of
 from .results import solution_json as solution_json
 from .results import summary as summary
-from .set_survey import best_pair as best_pair
 from .setup import SIGMA_PRINT as SIGMA_PRINT
 from .setup import SIGMA_RADIAL as SIGMA_RADIAL
 from .setup import Measuring as Measuring

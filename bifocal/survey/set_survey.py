@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model import FlagLimits, Pair, PhotoSet, SetIntersection, displacement
+from bifocal.model import FlagLimits, PhotoSet, SetIntersection, displacement
 from bifocal.rays import plane_position
 from bifocal.remarks import remark
 from bifocal.survey.observations import PointObservations
 from bifocal.survey.relief_table import ReliefTable, entries
-
-
-def best_pair(photos: PhotoSet) -> Pair:
-    """Return the pair of a set that promises most of relief, else its first two photos."""
-    ranked = photos.pairs()
-    return photos.pair(ranked[0].far, ranked[0].near) if ranked else photos.pair()
 
 
 def solve_set(

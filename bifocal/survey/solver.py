@@ -32,7 +32,7 @@ from bifocal.survey.remarks import (
     unused_remarks,
     wide_remarks,
 )
-from bifocal.survey.set_survey import best_pair, solve_set
+from bifocal.survey.set_survey import solve_set
 from bifocal.survey.setup import SurveySetup
 from bifocal.survey.solved_survey import Corrections, SolvedSurvey
 from bifocal.survey.survey_input import SurveyInput
@@ -141,7 +141,7 @@ def solve_survey_of_set(
     points, measuring = survey.points, survey.setup.measuring
     numbers = photos.picked_in(points.pixels)
     picked = photos.only(numbers) if len(numbers) < len(photos) else photos
-    pair = best_pair(picked)
+    pair = picked.best_pair()
     if not points.has_pixels.any():
         needed = remark("survey.set_pixels", count=len(photos))
         raise InputError(f"{survey.where}: {needed}")
