@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from bifocal import InputError
-from bifocal.campaigns.dask_cluster import _look
+from bifocal.campaigns.dask_cluster import _Crew, _look
 from bifocal.campaigns.pair_job import run_pair
 from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import packed, run_parcel, unpacked
@@ -98,3 +99,24 @@ def test_an_absent_photo_is_named_before_anything_is_sent(job):
 
 def test_a_machine_that_does_not_see_a_folder_says_so(tmp_path):
     assert _look(str(tmp_path / "absent")) == (program(), "")
+
+
+@pytest.mark.parametrize("first_sees", [True, False])
+def test_photos_are_sent_as_soon_as_one_worker_does_not_see_the_folder(
+    tmp_path, monkeypatch, first_sees
+):
+    """And on, although one that comes later sees it."""
+    workers, lines = {"a": {"nthreads": 2}}, []
+    client = SimpleNamespace(scheduler_info=lambda **_: {"workers": dict(workers)})
+    sees = {"a": first_sees, "b": not first_sees}
+    monkeypatch.setattr(
+        "bifocal.campaigns.dask_cluster._see_folder", lambda *of: all(sees[w] for w in of[3])
+    )
+    crew = _Crew(client, "tcp://x", tmp_path, SimpleNamespace(heard=lines.append), ship=False)
+    assert crew.ship is not first_sees
+    workers["b"] = {"nthreads": 3}
+    crew.look()
+    assert (crew.ship, crew.threads) == (True, 5)
+    crew.look()  # nobody new: nothing to tell
+    assert [line.count("photos are sent") for line in lines] == [int(not first_sees), 1]
+    assert "workers 2, pairs at once 5" in lines[1]

@@ -66,6 +66,7 @@ def test_nothing_is_told_where_nothing_changed_and_a_bulge_of_three_sigma_is_fou
         # One of the ten is outlined by patches of twice the width: its middle is as coarse.
         assert pytest.approx((1.4, 1.8), abs=0.2) == (bulge.X, bulge.Y)
         assert bulge.area == pytest.approx(0.1936, abs=3.5 * bulge.sigma_area)
+        assert bulge.sigma_area < bulge.area
         ratios.append((bulge.volume - 0.1936 * moved) / bulge.sigma_volume)
     # The mean of four errors in sigmas is good to 0.5, their root mean square to 0.35.
     assert len(ratios) >= 3

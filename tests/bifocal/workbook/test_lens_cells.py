@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import openpyxl
 import pytest
 
-from bifocal import InputError, Measuring, SurveySetup, Taking, solve
+from bifocal import InputError, Measuring, Pair, SurveySetup, Taking, solve
 from bifocal.survey.survey_lens import SurveyLens
 from bifocal.workbook.output import write_result
-from bifocal.workbook.pair_workflow import read_pair
+from bifocal.workbook.pair_workflow import _corrected, read_pair
 from tests.bifocal.workbook.filled_forms import SETUP, fill, put
 from tests.bifocal.workbook.test_survey_workbook import assert_recalculated_equals_cached
 from tests.cases import few_by_default
@@ -131,3 +133,14 @@ def test_the_command_writes_the_cells(tmp_path):
     assert [cell.value for cell in book["Points"][4]][:8] == [
         *("id", "x1", "y1", "x2", "y2", "use", "code", "note")
     ]
+
+
+def test_what_the_set_up_corrects_in_millimetres_of_a_photo_moves_it_on_the_wall():
+    """1:500 of 35 mm at 17.5 m: 0.02 mm to the right and 0.01 mm up are 10 and 5 mm."""
+    photo = Pair.ideal(d1=17.5, d2=9.5, c1=35.0, c2=19.0, pixel_size=0.01).image1
+    shift = np.array([[1.0, 0.0, 0.02], [0.0, 1.0, 0.01], [0.0, 0.0, 1.0]])
+    moved = replace(photo, plane_from_pixel=_corrected(photo, shift))
+    pixels = np.array([[100.0, 50.0], [900.0, 600.0]])
+    before, after = photo.plane_from_pixels(pixels), moved.plane_from_pixels(pixels)
+    np.testing.assert_allclose(after - before, [[0.01, 0.005]] * 2, atol=1e-12)
+    assert _corrected(photo, None) is photo.plane_from_pixel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from types import SimpleNamespace
 
@@ -93,6 +94,17 @@ def test_wider_placements_give_better_depth():
     )  # fmt: skip
     depth = [p.sigma[2] for p in found]
     assert depth == sorted(depth, reverse=True)
+
+
+@pytest.mark.parametrize(("seen_by", "works"), [((4, 4), True), ((4, 3), False)])
+def test_an_opening_from_which_a_camera_does_not_see_every_point_is_left_out(
+    monkeypatch, seen_by, works
+):
+    study = SimpleNamespace(seen_by=np.array(seen_by), rms_sigma=np.ones(3), angle=[1.0])
+    monkeypatch.setattr("multimedia.design.accuracy.study_setup", lambda *_, **__: study)
+    settings = {"interface": TANK, "points": POINTS, "principal_distance": 25.0}
+    with nullcontext() if works else pytest.raises(GeometryError):
+        assert compare_placements(4, 0.6, **settings, sigma_image=0.001, half_angles=[0.5])
 
 
 def test_an_air_calibration_costs_in_water_and_a_new_one_regains_half():
