@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bifocal.model.diagnostics import Diagnostics, deviations_by_photo
-from bifocal.model.image import as_grey
 from bifocal.model.interior_orientation import Interior
 from bifocal.model.orientation_precision import CAMERA, moved
 from bifocal.model.pair_media import PairMedia
 from bifocal.model.photo_set import PhotoSet
 from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import OrientedSet, orient_set
-from bifocal.orientation.alignment import Alignment, facade_axes, lens_of, photo_of
+from bifocal.orientation.alignment import Alignment, facade_axes, lens_of, photo_of, radial_units
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.photo_alignment import align
+from bifocal.orientation.photo_alignment import align, photo_input
 from bifocal.orientation.tuning import REMARKS
 from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
@@ -116,10 +115,8 @@ def align_set(
         pair = align(images[0], images[1], interiors=lenses, control=control, site=site)
         return SetAlignment.of_pair(pair)
     control, site = control or Control(), site or SiteMeasures()
-    photos = [
-        PhotoInput(grey=as_grey(image, f"image{k}"), interior=interior, name=f"photo {k}")
-        for k, (image, interior) in enumerate(zip(images, interiors, strict=True), start=1)
-    ]
+    both = enumerate(zip(images, interiors, strict=True), start=1)
+    photos = [photo_input(image, interior, f"image{k}") for k, (image, interior) in both]
     return set_alignment(orient_set(photos, control=control, site=site), photos)
 
 
@@ -149,10 +146,7 @@ def set_alignment(
         cameras = tuple(camera.moved(axes, origin) for camera in cameras)
         covariance, assumed = moved(covariance, axes, len(cameras)), (note,)
     unit = np.ones((len(cameras), len(CAMERA)))
-    for row, camera, interior in zip(unit, cameras, first.interiors, strict=True):
-        # The distortion's radius counts in principal distances: there of the camera as adjusted.
-        ratio = (camera.matrix[0, 0] / interior.focal) ** 2
-        row[-2:] = ratio, ratio**2
+    unit[:, -2:] = radial_units(cameras, first.interiors)
     covariance *= np.outer(unit, unit)
     heights = np.arange(len(cameras)) * len(CAMERA) + CAMERA.index("Z")
     # Another face that may be the wall moves all cameras alike.

@@ -59,12 +59,6 @@ def align_photo_set(
             f"{out.name}: the file of a set of photos ends in {ENDING}; write --out "
             f"{out.name.partition('.')[0]}{ENDING}, or give two photos for a pair file."
         )
-    if len(paths) == 2:
-        pair = aligned_photos(paths[0], paths[1], out, options, overwrite=overwrite)
-        alignment = SetAlignment.of_pair(pair)
-        alignment.photos.write(out, overwrite=overwrite)
-        return alignment
-    way, options = way_of_set(options)
     twice = [path for k, path in enumerate(paths) if path.resolve() in
              {earlier.resolve() for earlier in paths[:k]}]  # fmt: skip
     if twice:
@@ -72,16 +66,19 @@ def align_photo_set(
     check_metres(options)
     check_not_input(out, *paths, *(path for path in (options.control, options.lengths) if path))
     check_all_writable(out, overwrite=overwrite)
+    if len(paths) == 2:
+        pair = aligned_photos(paths[0], paths[1], out, options, overwrite=overwrite)
+        alignment = SetAlignment.of_pair(pair)
+        alignment.photos.write(out, overwrite=overwrite)
+        return alignment
+    way, options = way_of_set(options)
     names = [path.name for path in paths]
     if alike := len({path.stem for path in paths}) < len(paths):  # as cameras count in each folder
         names = [f"{path.resolve().parent.name}/{path.name}" for path in paths]
     infos = [image_info(path) for path in paths]
     lenses = [*options.lenses, *[options.other_lenses] * (len(paths) - 2)]
-    numbers: tuple[int | str, ...] = (
-        1,
-        2,
-        *[""] * (len(paths) - 2),
-    )  # as the options of their lenses are called
+    # As the options of their lenses are called:
+    numbers: list[int | str] = [1, 2, *[""] * (len(paths) - 2)]
     photos = [
         PhotoInput(grey=read_grey(path), interior=interior_of_photo(info, lens, k), name=name)
         for k, path, name, info, lens in zip(numbers, paths, names, infos, lenses, strict=True)

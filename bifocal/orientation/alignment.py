@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -157,19 +157,19 @@ def make_alignment(
 def _of_pixels(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
     """Return the covariance of the cameras as the pair file counts it, shape (24, 24)."""
     unit = np.ones(len(adjusted.covariance))
-    for number, factors in enumerate(_radial_units(adjusted, observations)):
+    for number, factors in enumerate(radial_units(adjusted.cameras, observations.interiors)):
         first = number * len(CAMERA) + CAMERA.index("k1")
         unit[first : first + 2] = factors
     return adjusted.covariance * np.outer(unit, unit)
 
 
-def _radial_units(adjusted: AdjustedPair, observations: PairObservations) -> FloatArray:
-    """Return what k1 and k2 of either photo are multiplied by for the pair file, shape (2, 2).
+def radial_units(cameras: Sequence[Pinhole], interiors: Sequence[Interior]) -> FloatArray:
+    """Return what k1 and k2 of each photo are multiplied by for its file, shape (m, 2).
 
     The distortion's radius counts in principal distances: there of the camera as adjusted.
     """
-    cameras = zip(adjusted.cameras, observations.interiors, strict=True)
-    ratios = np.array([(camera.matrix[0, 0] / interior.focal) ** 2 for camera, interior in cameras])
+    both = zip(cameras, interiors, strict=True)
+    ratios = np.array([(camera.matrix[0, 0] / interior.focal) ** 2 for camera, interior in both])
     return np.column_stack([ratios, ratios**2])
 
 
@@ -177,7 +177,7 @@ def _radial(adjusted: AdjustedPair, observations: PairObservations) -> FloatArra
     """Return k1 and k2 of either photo as the covariance counts them; None where not estimated."""
     if not any(interior.sigma_radial for interior in observations.interiors):
         return None
-    return np.asarray(adjusted.radial * _radial_units(adjusted, observations))
+    return np.asarray(adjusted.radial * radial_units(adjusted.cameras, observations.interiors))
 
 
 def facade_axes(

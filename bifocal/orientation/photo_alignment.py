@@ -105,7 +105,10 @@ def align(
     site, media = site or SiteMeasures(), media or PairMedia.none()
     if media and image1 is not None and image2 is not None:
         image1, image2 = greys_through_water(image1, image2)
-    photos = (_photo(image1, interiors[0], "image1"), _photo(image2, interiors[1], "image2"))
+    photos = (
+        photo_input(image1, interiors[0], "image1"),
+        photo_input(image2, interiors[1], "image2"),
+    )
     direction = line and (as_points(line[1], "line", dimension=2), line[0] == "upright")
     if as_set_up:
         if control is not None or line is not None:
@@ -117,7 +120,9 @@ def align(
     return make_alignment(oriented, ordered, way=way, direction=direction)
 
 
-def _photo(image: NDArray[np.generic] | None, interior: Interior | None, name: str) -> PhotoInput:
+def photo_input(
+    image: NDArray[np.generic] | None, interior: Interior | None, name: str
+) -> PhotoInput:
     """Return a photo and what is known of its lens."""
     if image is None:
         if interior is None:
