@@ -27,6 +27,13 @@ def relief(names, values):
     return KnownPoints(ids=tuple(names), xyz=np.stack([nothing, nothing, values], axis=-1))
 
 
+def test_known_points_are_called_as_those_measured_unless_two_would_be_one():
+    known = relief(["P1", "007"], [0.1, 0.2])
+    assert known.called_as(["p1", "7"]).ids == ("p1", "7")
+    both = relief(["7", "07"], [0.1, 0.2])
+    assert both.called_as(["007"]) is both
+
+
 def test_statistics_of_three_errors_by_hand():
     # Errors 0.01, -0.02, 0.02 m: RMSE sqrt((1 + 4 + 4)/3) cm, mean 1/3 cm, largest 2 cm.
     check = check_points(table([0.11, 0.18, 0.32]), relief(["P0", "P1", "P2"], [0.1, 0.2, 0.3]))

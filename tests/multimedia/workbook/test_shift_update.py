@@ -208,6 +208,26 @@ def test_a_template_gets_results_and_the_options_set_up(tmp_path: Path) -> None:
     assert told in [pytest.approx(v) for v in kept["Multimedia"].values() if isinstance(v, float)]
 
 
+def test_what_options_say_of_the_set_up_is_typed_into_its_cells(tmp_path: Path) -> None:
+    first, second = tmp_path / "tank.xlsx", tmp_path / "moved.xlsx"
+    points = tmp_path / "points.csv"
+    points.write_text("id,X,Y,Z\nA,0.3,0.4,-0.2\nB,0,0,-0.1\n", encoding="utf-8")
+    assert run(points, *MEDIA, "--out", first).exit_code == 0
+    changed = ("--z0", "0.8", "--indices", "1,1.5,1.337")
+    assert run(first, *changed, "--out", second).exit_code == 0
+    before, after = office.stored(first)["Multimedia"], office.stored(second)["Multimedia"]
+    moved = {cell: value for cell, value in after.items() if before.get(cell) != value}
+    k, q = 1 / 1.337, 1 - 1 / 1.337**2
+    for value in (0.8, 1.337, k, q):
+        assert value in [pytest.approx(v) for v in moved.values() if isinstance(v, float)], value
+    book = openpyxl.load_workbook(first)
+    del book.defined_names["n_3"]
+    book.save(first)
+    result = run(first, *changed, "--out", tmp_path / "o.xlsx")
+    assert result.exit_code == 1
+    assert "n_3" in result.stderr
+
+
 def test_a_template_for_other_media_is_refused(tmp_path: Path) -> None:
     first, points = tmp_path / "tank.xlsx", tmp_path / "points.csv"
     points.write_text("id,R,ZP\nA,0.3,0.2\n", encoding="utf-8")
