@@ -1,10 +1,10 @@
 from .pair_job import PairOutcome as PairOutcome
-from .pair_steps import PairJob as PairJob
-from .pair_steps import proven as proven
+from .pair_points import proven as proven
 from .rectification import rectify_photo as rectify_photo
 from .survey_file import in_survey_words as in_survey_words
 from .survey_file import mosaic_wanted as mosaic_wanted
 from .survey_file import read_survey_file as read_survey_file
+from .surveyed_pair import PairJob as PairJob
 from .verification import verify as verify
 from .workflow import Machines as Machines
 from .workflow import begin_survey as begin_survey

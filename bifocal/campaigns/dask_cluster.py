@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
-from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import ShippedPair, found_anywhere, packed, run_parcel, unpacked
+from bifocal.campaigns.surveyed_pair import PairJob
 from bifocal.campaigns.worker_pool import Listener
 from bifocal.remarks import remark
 from photocore.errors import InputError

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bifocal.campaigns.pair_steps import PairJob, known_of, tables_of
+from bifocal.campaigns.pair_points import known_of
+from bifocal.campaigns.surveyed_pair import PairJob, tables_of
 from bifocal.faces import read_faces
 from bifocal.model import Lens
 from bifocal.reports import refuse_same_names

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 
-from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob, photo_roles, steps_of
+from bifocal.campaigns.pair_steps import photo_roles, steps_of
 from bifocal.campaigns.step_store import WholeRecord, read_whole_record, record_key, remove_made
+from bifocal.campaigns.surveyed_pair import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.remarks import remark
 from photocore.errors import InputError
 from photocore.provenance import FileHashes

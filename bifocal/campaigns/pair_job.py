@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from bifocal.campaigns.pair_steps import PairJob, steps_of
+from bifocal.campaigns.pair_steps import steps_of
 from bifocal.campaigns.step_store import (
     Step,
     StepRecord,
@@ -19,6 +19,7 @@ from bifocal.campaigns.step_store import (
     run_step,
     step_key,
 )
+from bifocal.campaigns.surveyed_pair import PairJob
 from bifocal.model import untold
 from photocore.cli import Progress, no_progress, unforeseen_message
 from photocore.errors import InputError, PhotogrammetryError

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bifocal.campaigns.pair_job import PairOutcome, run_pair
-from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.step_store import receive_step
+from bifocal.campaigns.surveyed_pair import PairJob
 from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TypedDict, TypeGuard
 
-from bifocal.campaigns.pair_steps import PRODUCTS, PairJob, tables_of
+from bifocal.campaigns.surveyed_pair import PRODUCTS, PairJob, tables_of
 from bifocal.options import FILES, JOINT, OF_PAIR
 from bifocal.options.commands import MosaicCommand
 from bifocal.remarks import remark

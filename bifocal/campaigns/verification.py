@@ -14,8 +14,8 @@ from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import cast
 
-from bifocal.campaigns.pair_steps import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.campaigns.step_store import FORMAT, RECORD, WholeRecord, read_record, record_key
+from bifocal.campaigns.surveyed_pair import FIRST_STEP, PRODUCTS, PairJob
 from bifocal.campaigns.workflow import facade
 from bifocal.files import SUMS, read_survey_points
 from bifocal.model import Pair

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome, plan_of_steps, run_steps
-from bifocal.campaigns.pair_steps import PairJob, tables_of
 from bifocal.campaigns.step_store import Step, clean
+from bifocal.campaigns.surveyed_pair import PairJob, tables_of
 from bifocal.options import JOINT as JOINT_OPTIONS
 from bifocal.remarks import remark
 from photocore.cli import Progress, no_progress

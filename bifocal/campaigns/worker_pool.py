@@ -14,7 +14,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bifocal.campaigns.pair_job import PairOutcome
-from bifocal.campaigns.pair_steps import PairJob
+from bifocal.campaigns.surveyed_pair import PairJob
 from bifocal.remarks import remark
 from photocore.machine import cores, free_memory
 

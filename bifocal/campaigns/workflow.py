@@ -13,15 +13,9 @@ from bifocal.campaigns.folder_locks import locked
 from bifocal.campaigns.inputs import check_files, check_photos
 from bifocal.campaigns.leftovers import refuse_other_delivery, remove_leftovers
 from bifocal.campaigns.pair_job import PairOutcome, plan_of
-from bifocal.campaigns.pair_steps import (
-    FIRST_STEP,
-    MOST_PRODUCTS,
-    PRODUCTS,
-    PairJob,
-    refusal,
-    steps_of,
-)
+from bifocal.campaigns.pair_steps import refusal, steps_of
 from bifocal.campaigns.step_store import Step, clean
+from bifocal.campaigns.surveyed_pair import FIRST_STEP, MOST_PRODUCTS, PRODUCTS, PairJob
 from bifocal.campaigns.whole_wall import (
     JOINT,
     MOSAIC,

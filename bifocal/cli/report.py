@@ -56,8 +56,7 @@ def command(source: Path, out: Path, overwrite: bool, **options: Any) -> None:
     through for a pocket calculator.
     """
     from bifocal.options import PROJECT
-    from bifocal.reports import report_of
-    from bifocal.reports.workflow import ReportTask
+    from bifocal.reports import ReportTask, report_of
 
     project = {name: value for name in PROJECT if (value := options.pop(name)) is not None}
     unit, language = options.pop("unit") or "", options.pop("language") or ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import cv2
 import numpy as np
@@ -31,6 +31,13 @@ FOR_CLIENTS = frozenset({".pdf", "_relief.pdf", ".dxf", ".png", "_report.html", 
 DATA = "data"
 #: Points of a profile, at most.
 PROFILE_POINTS = 2000
+
+
+class FileOffered(TypedDict):
+    """A file that is offered for download."""
+
+    name: str
+    bytes: int
 
 
 class Products:
@@ -88,7 +95,7 @@ class Products:
             offered[workbook.name] = workbook
         return offered
 
-    def listed(self, workbook: Path) -> list[dict[str, Any]]:
+    def listed(self, workbook: Path) -> list[FileOffered]:
         """Return names and sizes of the files offered for download."""
         offered = self.downloads(workbook)
         return [{"name": n, "bytes": p.stat().st_size} for n, p in sorted(offered.items())]

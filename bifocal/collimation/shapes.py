@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -128,19 +127,17 @@ def shapes_from(faces: Faces, pair: Pair) -> list[dict[str, object]]:
     return shapes
 
 
-def commands_for(faces: Faces, state: SurveyState, pair: Pair) -> list[dict[str, Any]]:
+def commands_for(faces: Faces, state: SurveyState, pair: Pair) -> list[dict[str, object]]:
     """Return the commands that make the survey's faces those of a file; none if they are."""
     if faces.to_dict() == faces_of(state, pair).to_dict():
         return []
     gone = [shape.name for shape in state.shapes.values() if shape.kind != "outline"]
-    return [
-        *({"op": "shape.delete", "name": name} for name in gone),
-        *(
-            {"op": "shape.set", "kind": shape["kind"], "corners": shape["corners"]}
-            | ({"name": shape["name"]} if shape["name"] else {})
-            for shape in shapes_from(faces, pair)
-        ),
-    ]
+    commands: list[dict[str, object]] = [{"op": "shape.delete", "name": name} for name in gone]
+    for shape in shapes_from(faces, pair):
+        name = {"name": shape["name"]} if shape["name"] else {}
+        corners = {"kind": shape["kind"], "corners": shape["corners"]}
+        commands.append({"op": "shape.set", **corners, **name})
+    return commands
 
 
 def _drawn(pair: Pair, places: FloatArray) -> dict[str, object]:

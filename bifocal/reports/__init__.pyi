@@ -1,6 +1,7 @@
 from .accuracy import precision_in_words as precision_in_words
 from .accuracy import verdict_in_words as verdict_in_words
 from .accuracy import wall_in_words as wall_in_words
+from .content import ReportTask as ReportTask
 from .content import ortho_thumbnail as ortho_thumbnail
 from .content import read_content as read_content
 from .control_survey import is_exchanged as is_exchanged

@@ -2,9 +2,9 @@
 
 Read `observations`, `setup`, `survey_lens`, `survey_media` and `survey_input` for what goes in,
 `relief_table`, `reference` and `solved_survey` for what comes out; `solver` leads from one to the
-other. It exchanges or converts what was typed in other units (`units`), corrects the orientation
-by points of the plane (`orientation_check`), and calls `point_survey`, where Eqs. (1) to (7) run;
-its columns are prepared by `radii`, `refracted_radii` and `image_shift`. More than two photos are
+other. `arranging` exchanges or converts what was typed in other units (`units`) and corrects the
+orientation by points of the plane (`orientation_check`); `point_survey` is where Eqs. (1) to (7)
+run, its columns prepared by `radii`, `refracted_radii` and `image_shift`. More than two photos are
 `other_photos` and `set_survey`. Then the world: `georeferencing`, by `weighted_similarity`, its
 worth by `transformation_precision`. Last the judgement: `check_points`, `taped`, `tolerances`,
 `wall_precision`, `basis`, `remarks`; `results` are its words.

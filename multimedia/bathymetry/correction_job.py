@@ -24,6 +24,8 @@ DEEPEST = 200.0
 SHORE = 3.0
 #: Lengths that differ by more than this are most likely in different units.
 MIXED_UNITS = 1000.0
+#: Attribute that marks a cloud this package has corrected.
+MARK = "refraction"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

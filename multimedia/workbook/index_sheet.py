@@ -2,17 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
 from openpyxl.chart import Reference
 
-from multimedia.refraction import (
-    QUAN_FRY,
-    salinity_from_index,
-    water_index_derivatives,
-    water_refractive_index,
-)
 from photocore.workbook import HEAD_FONT, BookBuilder, FormulaBook, SheetBuilder, scatter
 
 FORMULAS = FormulaBook(__package__)
@@ -30,60 +21,43 @@ _LIGHT = range(400, 701, 25)
 _CHART_HEAD = 21
 
 
-def write_index_sheet(book: BookBuilder) -> float:
-    """Write the sheet of the refractive index; return the index it shows."""
+def write_index_sheet(book: BookBuilder) -> None:
+    """Write the sheet of the refractive index."""
     sheet = book.sheet("RefractiveIndex", "index_how")
     sheet.headings(4, ("name", "description", "value", "unit"), (18, 56, 14, 14))
     for row, (name, value, unit, limits) in enumerate(_GIVEN, start=5):
         sheet.describe(row, (name, book.word(name)), unit)
         sheet.input(f"C{row}", value, name=name)
         sheet.validate(f"C{row}", title=name, prompt=book.word(name), limits=limits)
-    water: dict[str, Any] = {name.removesuffix("_m"): value for name, value, *_ in _GIVEN}
-    slopes = water_index_derivatives(**water)
-    n_w = float(slopes.refractive_index)
-    n_quan_fry = float(water_refractive_index(**water, formula=QUAN_FRY))
-    results = (
-        ("n_hoehle", n_w, ""),
-        ("n_quan_fry", n_quan_fry, ""),
-        ("dn_dT", float(slopes.d_temperature), "1/°C"),
-        ("dn_dS", float(slopes.d_salinity), "1/%"),
-    )
+    results = (("n_hoehle", ""), ("n_quan_fry", ""), ("dn_dT", "1/°C"), ("dn_dS", "1/%"))
     *lines, inverse = FORMULAS.columns("index")
     sheet.headings(10, ("result", "description", "value", "unit"))
-    for row, (line, (words, value, unit)) in enumerate(zip(lines, results, strict=True), start=11):
+    for row, (line, (words, unit)) in enumerate(zip(lines, results, strict=True), start=11):
         sheet.describe(row, (line.key, book.word(words)), unit)
         name = line.key if line.key == "n_w" else ""
-        sheet.formula(f"C{row}", line.formula, value, form="0.000000", name=name)
+        sheet.formula(f"C{row}", line.formula, form="0.000000", name=name)
     sheet.headings(16, ("inverse", "description", "value", "unit"))
     sheet.describe(17, ("n_measured", book.word("n_measured")))
     sheet.input("C17", _MEASURED, name="n_measured")
     prompt = book.word("n_measured")
     sheet.validate("C17", title="n_measured", prompt=prompt, limits=(1.2, 1.6))
     sheet.describe(18, ("salinity", book.word("salinity")), "%")
-    warm = {key: value for key, value in water.items() if key != "salinity_percent"}
-    sheet.formula(
-        "C18", inverse.formula, float(salinity_from_index(_MEASURED, **warm)), form="0.000"
-    )
-    _over_light(sheet, water)
+    sheet.formula("C18", inverse.formula, form="0.000")
+    _over_light(sheet)
     sheet.finish(freeze="A5")
-    return n_w
 
 
-def _over_light(sheet: SheetBuilder, water: dict[str, Any]) -> None:
+def _over_light(sheet: SheetBuilder) -> None:
     """Write the index by both formulas over the wavelength, and draw it."""
     sheet.word(f"A{_CHART_HEAD - 1}", "over_light", HEAD_FONT)
     for letter, key in zip("ACD", ("nm", "Höhle", "Quan, Fry"), strict=True):
         sheet.text(f"{letter}{_CHART_HEAD}", key, HEAD_FONT)
-    others = {key: value for key, value in water.items() if key != "wavelength_nm"}
-    light = np.array(_LIGHT, dtype=float)
-    hoehle = water_refractive_index(wavelength_nm=light, **others)
-    quan_fry = water_refractive_index(wavelength_nm=light, **others, formula=QUAN_FRY)
     for i, wavelength in enumerate(_LIGHT):
         row = _CHART_HEAD + 1 + i
         sheet.worksheet[f"A{row}"] = wavelength
         lines = FORMULAS.columns("index", parts={"light": f"$A{row}"}, rows="over_light")
-        for line, found in zip(lines, (hoehle, quan_fry), strict=True):
-            sheet.formula(f"{line.key}{row}", line.formula, float(found[i]), form="0.000000")
+        for line in lines:
+            sheet.formula(f"{line.key}{row}", line.formula, form="0.000000")
     last = _CHART_HEAD + len(_LIGHT)
     data = [
         Reference(sheet.worksheet, min_col=column, min_row=_CHART_HEAD + 1, max_row=last)

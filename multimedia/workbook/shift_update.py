@@ -94,10 +94,10 @@ def update_template(
         raise InputError(f"{path}: has no table tblMM.")
     columns = area.headings()
     steps = sum(key[0] == "u" and key[1:].isdigit() for key in columns) - 1
-    values = table_values(setup, points, len(points.ids), max(steps, 1))
+    values = table_values(setup, points, max(steps, 1))
     for key, column in columns.items():
         for position, row in enumerate(rows):
-            if key in values and key not in ("id", "X", "Y", "Z", "R", "ZP"):
+            if key in values:
                 editor.set_result(area.sheet, table.rows[row], column, values[key][position])
     _store_chart(editor, area, [table.rows[row] for row in rows], values)
     return editor.save(out, overwrite=overwrite)
@@ -176,7 +176,7 @@ def add_columns(
         value=lambda name: _reference(media, *places[name]),
         given=table.columns.keys(),
     )
-    values = table_values(setup, points, len(points.ids), STEPS)
+    values = table_values(setup, points, STEPS)
     columns = [
         ResultColumn(
             key=column.key, heading=column.key, values=values[column.key], formula=column.formula,

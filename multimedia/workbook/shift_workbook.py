@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,9 @@ from openpyxl.utils import get_column_letter
 from multimedia.refraction import HIGHEST_INDEX, STEPS, TOLERANCE, unrolled_shift
 from multimedia.remarks import remark
 from multimedia.workbook.index_sheet import FORMULAS, write_index_sheet
-from multimedia.workbook.shift_points import IN_PLANE, ShiftPoints, ShiftResult, ShiftSetup
+from multimedia.workbook.shift_points import ShiftPoints, ShiftSetup
 from multimedia.workbook.shift_sketch import shift_sketch
 from multimedia.workbook.words import WORDS
-from photocore.arrays import BoolArray
 from photocore.errors import InputError
 from photocore.output import check_ending
 from photocore.workbook import (
@@ -98,13 +96,11 @@ def write_shift_workbook(
     book.book.properties.creator = book.book.properties.title = "multimedia"
     lines = [line for line in WORDS.readme(language) if line]
     book.readme(lines, shift_sketch(book.word("sketch")), rows=len(lines) + 3)
-    index = write_index_sheet(book)
-    if points is None:
-        indices = (*setup.layers.indices[:-1], index)
-        setup = replace(setup, layers=replace(setup.layers, indices=indices))
+    write_index_sheet(book)
     _shift_sheet(book, setup, points, count=count, steps=steps)
     book.book.move_sheet("RefractiveIndex", 1)
     book.open_at("Multimedia")
+    book.calculate()
     book.save(path, overwrite=overwrite)
 
 
@@ -116,11 +112,12 @@ def _shift_sheet(
     columns = shift_columns(len(setup.layers.indices), steps)
     keys, last = [column.key for column in columns], get_column_letter(len(columns))
     head = 7 + len(setup.layers.indices) + len(_lengths(setup))
-    values = table_values(setup, points, count, steps)
-    sheet.table("tblMM", columns, at=(head, 1), rows=count, cells=values)
+    typed = {} if points is None else typed_values(points)
+    inputs = {key: typed.get(key, ()) for key in ("id", *INPUTS)}
+    sheet.table("tblMM", columns, at=(head, 1), rows=count, cells=inputs)
     flags = f"{last}{head + 1}:{last}{head + count}"
     colour_words(sheet.worksheet, flags, _FLAGS, bold=_FLAGS.keys() - {"OK"}, stop=True)
-    _chart(sheet, keys, values, head=head, count=min(count, _CHART_ROWS))
+    _chart(sheet, keys, head=head, count=min(count, _CHART_ROWS))
     printed = count if points is None else max(len(points.ids), 1)
     sheet.finish(landscape=True, freeze=f"B{head + 1}", repeat=f"{head - 1}:{head}")
     sheet.worksheet.print_area = f"A1:{last}{head + printed}"
@@ -151,6 +148,8 @@ def media_cells(
     sheet = book.sheet("Multimedia", "shift_how" if named else "media_how")
     indices = setup.layers.indices
     count, least = len(indices), min(indices)
+    # A workbook that is all ours is calculated whole.
+    shown: list[float | None] = [None] * count if named else [least / n for n in indices]
     if live:
         links[f"n_{count}"] = "n_w"
     for letter, text in zip("ABCD", (book.word("name"), book.word("value"), "k", "q"), strict=True):
@@ -158,14 +157,14 @@ def media_cells(
         sheet.worksheet[f"{letter}4"].fill = HEAD_FILL
     for i, index in enumerate(indices, start=1):
         row, name = 4 + i, f"n_{i}"
-        _value(sheet, row, name, index, links)
+        _value(sheet, row, name, index, links, carried=not named)
         prompt = book.word("index_prompt")
         sheet.validate(f"B{row}", title=name, prompt=prompt, limits=(1, HIGHEST_INDEX))
         # In a workbook of the user's own the names may be taken.
         own, ratio = (name, f"k_{i}") if named else (f"$B${row}", f"$C${row}")
-        k, text = least / index, f"MIN($B$5:$B${4 + count})/{own}"
+        k, text = shown[i - 1], f"MIN($B$5:$B${4 + count})/{own}"
         sheet.formula(f"C{row}", text, k, form="0.000000", name=f"k_{i}")
-        sheet.formula(f"D{row}", f"1-{ratio}^2", 1 - k * k, form="0.000000", name=f"q_{i}")
+        sheet.formula(f"D{row}", f"1-{ratio}^2", k and 1 - k * k, form="0.000000", name=f"q_{i}")
         place = "camera" if i == 1 else "object" if i == count else "layer"
         words = book.word(f"index_{place}").format(n=i - 1)
         sheet.text(f"E{row}", words, LABEL_FONT)
@@ -174,12 +173,14 @@ def media_cells(
 
 
 def _value(
-    sheet: SheetBuilder, row: int, name: str, value: float, links: Mapping[str, str]
-) -> None:
+    sheet: SheetBuilder, row: int, name: str, value: float, links: Mapping[str, str],
+    *, carried: bool = True,
+) -> None:  # fmt: skip
     """Write a named value, typed or as a reference to where it stands."""
     sheet.text(f"A{row}", name)
     if name in links:
-        sheet.formula(f"B{row}", links[name], value, name=name, editable=True)
+        shown = value if carried else None
+        sheet.formula(f"B{row}", links[name], shown, name=name, editable=True)
     else:
         sheet.input(f"B{row}", value, name=name)
 
@@ -213,14 +214,7 @@ def _write_lengths(sheet: SheetBuilder, setup: ShiftSetup, links: Mapping[str, s
             sheet.validate(f"B{row}", title=name, prompt=words, limits=(-1e9, 1e9))
 
 
-def _chart(
-    sheet: SheetBuilder,
-    keys: list[str],
-    values: dict[str, list[CellValue]],
-    *,
-    head: int,
-    count: int,
-) -> None:
+def _chart(sheet: SheetBuilder, keys: list[str], *, head: int, count: int) -> None:
     """Draw the shift over the distance from the nadir, right of the table; numbers behind."""
     left, first = len(keys) + _CHART_COLUMNS, head + 1
     letters = [get_column_letter(left + i) for i in range(2)]
@@ -229,11 +223,10 @@ def _chart(
         sheet.text(f"{letter}{head - 1}", key, LABEL_FONT)
         for i in range(count):
             # Texts would break a scatter chart, so blanks are #N/A.
-            cell, shown = f"INDEX(tblMM[{key}],{i + 1})", values[key][i]
-            value = shown if isinstance(shown, int | float) else float("nan")
+            cell = f"INDEX(tblMM[{key}],{i + 1})"
             grey = Font(name=FACE, size=LABEL, color="7F7F7F")
             text = f"IF(ISNUMBER({cell}),{cell},NA())"
-            sheet.formula(f"{letter}{first + i}", text, value, form="0.000", font=grey)
+            sheet.formula(f"{letter}{first + i}", text, form="0.000", font=grey)
     x, y = (
         Reference(sheet.worksheet, min_col=left + i, min_row=first, max_row=first + count - 1)
         for i in range(2)
@@ -282,15 +275,26 @@ def shift_columns(
     return FORMULAS.columns("shift", given, parts)
 
 
+def typed_values(points: ShiftPoints) -> dict[str, list[CellValue]]:
+    """Return what is typed of points: X, Y, Z, or R and ZP of those that have only these."""
+    in_plane = np.asarray(np.isfinite(points.xy).all(axis=1))
+    columns = {
+        "X": (points.xy[:, 0], in_plane), "Y": (points.xy[:, 1], in_plane),
+        "Z": (0.0 - points.depth, in_plane), "R": (points.radius, ~in_plane),
+        "ZP": (points.depth, ~in_plane),
+    }  # fmt: skip
+    values: dict[str, list[CellValue]] = {"id": list(points.ids)}
+    for key, (column, typed) in columns.items():
+        values[key] = [
+            float(x) if is_typed else None for x, is_typed in zip(column, typed, strict=True)
+        ]
+    return values
+
+
 def table_values(
-    setup: ShiftSetup, points: ShiftPoints | None, count: int, steps: int
-) -> dict[str, list[CellValue]]:
-    """Return what every column shows, blank rows included."""
-    keys = [column.key for column in shift_columns(len(setup.layers.indices), steps)]
-    values: dict[str, list[CellValue]] = {key: [None] * count for key in keys[:6]}
-    values |= {key: [""] * count for key in keys[6:]}
-    if points is None:
-        return values
+    setup: ShiftSetup, points: ShiftPoints, steps: int
+) -> dict[str, Sequence[CellValue]]:
+    """Return what the formulas of points show in a workbook that is not calculated whole."""
     # Not layers.heights: the sheet computes with what it holds.
     heights: list[ArrayLike] = [setup.z0, *setup.layers.thicknesses, points.depth]
     shift = unrolled_shift(points.radius, heights, setup.layers.indices, steps=steps)
@@ -299,18 +303,16 @@ def table_values(
     nadir = np.asarray(setup.nadir)
     xy_bar = nadir + (points.xy - nadir) * ratio[:, None]
     solved = np.abs(shift.residual) <= TOLERANCE * points.radius
-    columns = ShiftResult(
-        radius_bar=shift.radius_bar,
-        xy_bar=xy_bar,
-        flags=tuple("OK" if good else "CHECK" for good in solved),
-    ).columns(points, every=True)
-    columns |= {f"u{step}": u for step, u in enumerate(shift.u)}
-    columns |= {"R_u": points.radius, "ZP_u": points.depth, "resid": shift.residual}
-    with_xy = np.asarray(np.isfinite(points.xy).all(axis=1))
-    for key, column in columns.items():
-        shown: BoolArray = np.ones(len(points.ids), dtype=bool)
-        if key in (*IN_PLANE, "R", "ZP"):
-            shown = with_xy if key in IN_PLANE else ~with_xy
-        for i in np.flatnonzero(shown).tolist():
-            values[key][i] = column[i] if key in ("id", "flag") else float(column[i])
-    return values
+    columns = {f"u{step}": u for step, u in enumerate(shift.u)} | {
+        "R_u": points.radius, "ZP_u": points.depth, "resid": shift.residual,
+        "Rbar": shift.radius_bar, "dR": shift.radius_bar - points.radius,
+    }  # fmt: skip
+    in_plane = np.asarray(np.isfinite(points.xy).all(axis=1))
+    return {
+        **{key: column.tolist() for key, column in columns.items()},
+        **{
+            f"{axis}bar": [x if typed else "" for x, typed in zip(column, in_plane, strict=True)]
+            for axis, column in zip("XY", xy_bar.T.tolist(), strict=True)
+        },
+        "flag": ["OK" if good else "CHECK" for good in solved],
+    }

@@ -20,6 +20,7 @@ from bifocal.collimation.server.requests import answer, in_thread, json_body, se
 from bifocal.collimation.server.security import COOKIE, Guard, TooLarge, place_of
 from bifocal.collimation.server.state_changes import HELD, StateEditions
 from bifocal.collimation.server.state_view import state_of
+from bifocal.collimation.server.survey_routes import ROUTES as SURVEYS
 from bifocal.collimation.session import Session
 from bifocal.remarks import in_language
 from photocore.errors import PhotogrammetryError
@@ -45,6 +46,7 @@ def application(session: Session, token: str) -> Guard:
         Route("/tiles/{space}/{image:int}/info", _tile_info),
         Route("/tiles/{space}/{image:int}/{level:int}/{column:int}_{row:int}.jpg", _tile),
         *MEASURING,
+        *SURVEYS,
         *PRODUCTS,
         Route("/web/{name:path}", _asset),
         Route("/{name:path}", _asset),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from starlette.datastructures import UploadFile
+from numpy.typing import ArrayLike
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
@@ -20,12 +20,9 @@ from bifocal.collimation.live_results import LiveResults
 from bifocal.collimation.pictures import Pictures
 from bifocal.collimation.product_graph import out_of_date
 from bifocal.collimation.server.requests import answer, in_thread, json_body, session_of
-from bifocal.collimation.server.state_view import state_of
 from bifocal.collimation.server.streamed_zip import streamed_zip
-from bifocal.collimation.server.uploads import MOST, take_photos
 from bifocal.collimation.session import Session
 from bifocal.collimation.shapes import met, places_of, relief_within
-from bifocal.collimation.starting import open_sample, open_wall, recent, reopen, walls_at_hand
 from bifocal.collimation.uncertainty import precision_contours, uncertainty_picture
 from bifocal.collimation.workbook.profile_book import profile_book, profile_csv
 from bifocal.faces import beside
@@ -39,71 +36,6 @@ _PROFILES = {
     "csv": (profile_csv, "text/csv"),
     "xlsx": (profile_book, "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"),
 }
-
-
-async def _photos(request: Request) -> Response:
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind != "multipart/form-data":
-        raise HTTPException(415, "expected multipart/form-data.")
-    session = session_of(request)
-    async with request.form(max_files=MOST, max_fields=MOST) as form:
-        sent = [form.get(f"photo{number}") for number in range(1, MOST + 1)]
-        files = [(each.filename or "", each.file) for each in sent if isinstance(each, UploadFile)]
-
-        def take() -> dict[str, object]:
-            present = session.all_photos
-            further = len(present) > 1 and len(files) == 1
-            if not further:
-                session.check_new_photos()
-            photos = take_photos(session.files.folder, files, present)
-            if further:
-                session.give_others(photos[2:])
-            else:
-                session.give_photos(photos)
-            return state_of(session)
-
-        return answer(await in_thread(take))
-
-
-async def _take_away(request: Request) -> Response:
-    """Let a photo beside far and near go; its file stays where it is."""
-    session, number = session_of(request), request.path_params["number"]
-    photos = [p for n, p in enumerate(session.all_photos, start=1) if n > 2 and n != number]
-    await in_thread(session.give_others, photos)
-    return answer(await in_thread(state_of, session))
-
-
-async def _sample(request: Request) -> Response:
-    session = session_of(request)
-    await in_thread(open_sample, session)
-    return answer(await in_thread(state_of, session))
-
-
-async def _walls(request: Request) -> Response:
-    return answer({"walls": await in_thread(walls_at_hand, session_of(request))})
-
-
-async def _wall(request: Request) -> Response:
-    session, number = session_of(request), number_of(await json_body(request), "number")
-    await in_thread(open_wall, session, 0 if number is None else int(number))
-    return answer(await in_thread(state_of, session))
-
-
-async def _recent(request: Request) -> Response:
-    """Name the surveys that were open before: their folders and names, no more."""
-    names = [Path(name) for name in await in_thread(recent)]
-    workbook = session_of(request).files.workbook.resolve()
-    shown = [
-        {"number": number, "name": path.stem, "folder": path.parent.name}
-        for number, path in enumerate(names)
-        if path != workbook
-    ]
-    return answer({"surveys": shown})
-
-
-async def _reopen(request: Request) -> Response:
-    number = number_of(await json_body(request), "number")
-    return answer({"url": await in_thread(reopen, -1 if number is None else int(number))})
 
 
 async def _start(request: Request) -> Response:
@@ -223,7 +155,7 @@ async def _met(request: Request) -> Response:
 
 async def _profile(request: Request) -> Response:
     body = await json_body(request)
-    start, end = (_place(body, key) for key in ("from", "to"))
+    start, end = (_place(body.get(key) or [], key) for key in ("from", "to"))
     return answer(await in_thread(session_of(request).products.profile, start, end))
 
 
@@ -247,8 +179,8 @@ async def _profile_file(request: Request) -> Response:
     return Response(await in_thread(written), media_type=kind, headers=headers)
 
 
-def _place(body: dict[str, Any], key: str) -> FloatArray:
-    place = as_points(body.get(key) or [], key, dimension=2)
+def _place(typed: ArrayLike, key: str) -> FloatArray:
+    place = as_points(typed, key, dimension=2)
     if place.ndim != 1:
         raise FieldError(f"{key}: expected [X, Y] in metres.")
     return place
@@ -270,13 +202,6 @@ async def _contours(request: Request) -> Response:
 
 
 ROUTES = [
-    Route("/api/photos", _photos, methods=["POST"]),
-    Route("/api/photos/{number:int}", _take_away, methods=["DELETE"]),
-    Route("/api/sample", _sample, methods=["POST"]),
-    Route("/api/walls", _walls),
-    Route("/api/walls", _wall, methods=["POST"]),
-    Route("/api/recent", _recent),
-    Route("/api/recent", _reopen, methods=["POST"]),
     Route("/api/jobs", _start, methods=["POST"]),
     Route("/api/jobs/{number}", _cancel, methods=["DELETE"]),
     Route("/download/{name:path}", _download),

@@ -161,15 +161,26 @@ class Calculation:
         Unknown
             As `value`.
         """
+        shown: dict[tuple[str, int, int], CellValue] = {}
         with _deep():
-            return {
-                (title, *at): self._cell(title, *at).items()[0]
-                for title, sheet in self._sheets.items()
-                for at, content in sheet.cells.items()
-                if isinstance(content, _Formula)
-                and (title, *at) not in self._shown
-                and sheet.typed.get(at[1], (0, ()))[0] != at[0]
-            }
+            for title, sheet in self._sheets.items():
+                columns = {
+                    number: [(*rows, self._column(title, rows, number).items()) for rows in long]
+                    for number, long in sheet.long.items()
+                    if number not in sheet.typed
+                }
+                for (row, number), content in sheet.cells.items():
+                    if not isinstance(content, _Formula) or (title, row, number) in self._shown:
+                        continue
+                    if sheet.typed.get(number, (0, ()))[0] == row:
+                        continue
+                    inside = [(a, v) for a, b, v in columns.get(number, ()) if a <= row <= b]
+                    shown[title, row, number] = (
+                        inside[0][1][row - inside[0][0]]
+                        if inside
+                        else self._cell(title, row, number).items()[0]
+                    )
+        return shown
 
     def columns(self, title: str, first: int) -> dict[int, list[CellValue]]:
         """Return what the columns of formulas show that begin in a row of a sheet, by number.

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-from bifocal.campaigns.pair_steps import PairJob, proven, steps_of
+from bifocal.campaigns.pair_points import proven
+from bifocal.campaigns.pair_steps import steps_of
+from bifocal.campaigns.surveyed_pair import PairJob
 from bifocal.options import DRAWING, MAP, OF_PAIR, OF_STEP, PICTURE, PROJECT
 from tests.recorded import Recorded, leaves
 

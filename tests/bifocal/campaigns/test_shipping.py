@@ -10,9 +10,9 @@ import pytest
 from bifocal import InputError
 from bifocal.campaigns.dask_cluster import _Crew, _look
 from bifocal.campaigns.pair_job import run_pair
-from bifocal.campaigns.pair_steps import PairJob
 from bifocal.campaigns.shipping import packed, run_parcel, unpacked
 from bifocal.campaigns.step_store import Step
+from bifocal.campaigns.surveyed_pair import PairJob
 from photocore.provenance import program
 
 

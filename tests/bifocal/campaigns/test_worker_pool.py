@@ -8,8 +8,8 @@ from pathlib import Path
 from PIL import Image
 
 from bifocal.campaigns import worker_pool
-from bifocal.campaigns.pair_steps import BASE_MEMORY, MEMORY_PER_PIXEL, PairJob
 from bifocal.campaigns.shipping import found_anywhere
+from bifocal.campaigns.surveyed_pair import BASE_MEMORY, MEMORY_PER_PIXEL, PairJob
 from bifocal.campaigns.worker_pool import Listener, run_here
 
 

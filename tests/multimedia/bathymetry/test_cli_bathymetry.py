@@ -264,7 +264,7 @@ def test_a_dem_seen_by_cameras_returns_to_the_true_bed(tmp_path: Path) -> None:
 
 
 def test_windows_leave_no_seams_in_the_dem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from multimedia.bathymetry import workflow
+    from multimedia.bathymetry import dem_correction
 
     x, y = np.meshgrid(
         500_000 + 0.5 * (np.arange(150) + 0.5), 5_200_000 - 0.5 * (np.arange(130) + 0.5)
@@ -275,7 +275,7 @@ def test_windows_leave_no_seams_in_the_dem(tmp_path: Path, monkeypatch: pytest.M
     write_cameras(tmp_path / "cameras.csv", CENTRES + np.array([500_000.0, 5_199_950, 0]))
     options = ("--cameras", tmp_path / "cameras.csv", "--max-angle", 80)
     assert bathymetry(tmp_path / "in.tif", tmp_path / "whole.tif", *options)[0] == 0
-    monkeypatch.setattr(workflow, "WINDOW", 40)
+    monkeypatch.setattr(dem_correction, "WINDOW", 40)
     assert bathymetry(tmp_path / "in.tif", tmp_path / "parts.tif", *options)[0] == 0
     whole, parts = read_band(tmp_path / "whole.tif"), read_band(tmp_path / "parts.tif")
     np.testing.assert_allclose(parts, whole, atol=1e-9)

@@ -74,6 +74,22 @@ def head_row(path: Path) -> int:
     return int(re.match(r"A(\d+)", area)[1])  # type: ignore[index]
 
 
+@pytest.mark.parametrize("name", ORDERS)
+def test_what_the_formulas_give_equals_the_library(name: str, tmp_path: Path) -> None:
+    setup, path = ORDERS[name], tmp_path / "points.xlsx"
+    points = points_for(setup)
+    write_shift_workbook(path, setup, points, rows=1)
+    stored = office.stored(path)
+    table = table_of(stored["Multimedia"], head=head_row(path))
+    exact = radial_shift(points.radius, z0=setup.z0, zp=points.depth, layers=setup.layers)
+    np.testing.assert_allclose(np.array(table["Rbar"], float), exact, rtol=1e-9, atol=1e-12)
+    assert table["flag"] == ["OK"] * len(exact)
+    light = {"wavelength_nm": 550, "temperature_c": 20, "salinity_percent": 0, "depth": 0}
+    for cell, formula in (("C11", {}), ("C12", {"formula": QUAN_FRY})):
+        n_w = float(water_refractive_index(**light, **formula))
+        assert stored["RefractiveIndex"][cell] == pytest.approx(n_w, rel=1e-14)
+
+
 @pytest.mark.acceptance
 @pytest.mark.office
 @pytest.mark.parametrize("name", ORDERS)
