@@ -19,16 +19,19 @@ def close_holes(
 ) -> None:  # fmt: skip
     """Fill holes of a window with texture, in place; those of more than ``largest`` [m2] white.
 
-    The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too: a ragged outline
-    would tell of the mask, not of the wall. Texture is a copy of what lies beside, shifted to where
-    the rim fits best, and levelled along the rim. It comes from what lies no farther out than the
-    hole: that is what goes on behind. Specks take the mean colour of their rim.
+    The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too, and as narrow a
+    sliver within it is white: a ragged outline would tell of the mask, not of the wall. Texture is
+    a copy of what lies beside, shifted to where the rim fits best, and levelled along the rim. It
+    comes from what lies no farther out than the hole: that is what goes on behind. Specks take the
+    mean colour of their rim.
     """
     side = int(HOLES.narrow / gsd) | 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     large = parts_of(holes, largest / gsd**2).astype(np.uint8)
     # What the fringe leaves of one may be a crumb.
     white = parts_of(cv2.morphologyEx(large, cv2.MORPH_OPEN, disc) > 0, largest / 2 / gsd**2)
+    if white.any():
+        white = _without_slivers(white, relief, disc)
     image[white] = np.iinfo(image.dtype).max
     source[white] = Source.NEITHER
     rest = (holes & ~white).astype(np.uint8)
@@ -37,6 +40,16 @@ def close_holes(
     for number in (np.flatnonzero(~closed[1:]) + 1).tolist():
         left, top, width, height, _ = stats[number].tolist()
         _copy_texture(image, source, label, number, (left, top, width, height), relief, gsd)
+
+
+def _without_slivers(white: BoolArray, relief: Float32Array, disc: ByteArray) -> BoolArray:
+    """Return white parts with what is narrower than a disc within them, unless it lies before.
+
+    A sliver of wall between two parts that no photo sees is seen by chance, a bar is not.
+    """
+    closed = cv2.morphologyEx(white.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0
+    level = cv2.dilate(np.where(white, relief, np.float32(-np.inf)), disc)
+    return np.asarray(white | (closed & (relief < level + np.float32(HOLES.before))))
 
 
 def _close_specks(

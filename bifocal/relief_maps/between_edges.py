@@ -81,7 +81,7 @@ def smoothed(
     if not believed.any():
         return relief
     per_relief = parallax_per_metre(frame)
-    smoother = _Smoother(*_conductances(frame, relief * per_relief, believed))
+    smoother = Smoother(*conductances(frame, relief * per_relief, believed))
     fit = PhotoFit(frame, 0.0)  # as precise photos: imprecise ones have the most to gain
     misfit = fit.smooth(fit.misfit(relief))
     over = np.maximum(misfit - np.median(misfit[believed]), 0)
@@ -101,12 +101,23 @@ def smoothed(
     return np.where(~believed & fits & ~anything, result, relief)
 
 
-def _conductances(
+def conductances(
     frame: Frame, parallax: Float32Array, believed: BoolArray
 ) -> tuple[Float32Array, Float32Array]:
     """Return how stiffly pixels hold to the next one of their row, and of their column, 0 to 1.
 
-    Shape (height, width) each; the last of a row or column holds to nothing.
+    Parameters
+    ----------
+    frame : Frame
+    parallax : ndarray of float32, shape (height, width)
+        Of the pixels of photo 1. [px]
+    believed : ndarray of bool
+        A step between two such pixels stays a step.
+
+    Returns
+    -------
+    rows, columns : ndarray of float32, shape (height, width)
+        The last of a row or column holds to nothing.
     """
     blurred = cv2.GaussianBlur(frame.image1, (0, 0), BETWEEN_EDGES.blur).astype(np.float32)
     results = []
@@ -120,8 +131,14 @@ def _conductances(
     return results[0], results[1]
 
 
-class _Smoother:
-    """Smooths pictures by rows and columns in turn."""
+class Smoother:
+    """Smooths pictures by rows and columns in turn.
+
+    Parameters
+    ----------
+    rows, columns : ndarray of float32, shape (height, width)
+        How stiffly pixels hold to the next one, 0 to 1 (`conductances`).
+    """
 
     def __init__(self, rows: Float32Array, columns: Float32Array) -> None:
         self.rows, self.columns = rows, np.ascontiguousarray(columns.T)

@@ -69,7 +69,7 @@ def put_behind(
     wide = cv2.morphologyEx(blocks.astype(np.uint8), cv2.MORPH_OPEN, square)
     if not wide.any():
         return relief
-    surface = _enlarged(_surface_behind(frame, relief, support), relief.shape)
+    surface = surface_behind(frame, relief, support)
     behind = np.where(np.isfinite(surface), surface, relief)
     hidden = forward_projection.hidden_in_second(frame, behind, least, lost == 0)
     unseen = (_block_means(hidden.astype(np.uint8)) > 0.5).astype(np.uint8)
@@ -104,10 +104,21 @@ def _block_means(values: np.ndarray) -> Float32Array:
     return np.asarray(means)
 
 
-def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> Float32Array:
-    """Return supported relief by blocks, between them the lower one along the radius.
+def surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> Float32Array:
+    """Return supported relief by blocks, between them the lower one along the radius. [m]
 
-    Infinite where the radius meets none.
+    Parameters
+    ----------
+    frame : Frame
+    relief : ndarray of float32, shape (height, width)
+        Of the pixels of photo 1. [m]
+    support : ndarray of bool
+        Pixels to be believed.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width)
+        Infinite where the radius meets none.
     """
     share = _block_means(support.astype(np.float32))
     sums = _block_means(np.where(support, relief, np.float32(0)))
@@ -124,4 +135,4 @@ def _surface_behind(frame: Frame, relief: Float32Array, support: BoolArray) -> F
     filled = forward_projection.fill_from_behind(bands, ~supported, grid, frame.foot(1).nadir)
     bands.r[~(supported | filled)] = np.inf
     # Chance supports blocks in the midst of a lost region.
-    return np.asarray(cv2.medianBlur(bands.r, 5))
+    return np.asarray(_enlarged(cv2.medianBlur(bands.r, 5), relief.shape))

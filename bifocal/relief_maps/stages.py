@@ -51,6 +51,7 @@ from bifocal.relief_maps import (
     plane_patches,
     second_hypothesis,
     seed,
+    sides,
     smoothing,
     snapping,
 )
@@ -172,6 +173,8 @@ STAGES = (
           "frame relief matched typical half", "relief"),
     Stage("plane patches", plane_patches.on_plain_walls,
           "frame relief half", "relief unpatched"),
+    Stage("sides of steps", sides.settled,
+          "frame relief support swept", "relief"),
     Stage("smoothed between edges", between_edges.smoothed,
           "frame relief support swept", "relief"),
     Stage("sigma", lambda frame, relief, matched, valid: (

@@ -164,3 +164,18 @@ def test_a_speck_of_which_nothing_is_behind_takes_what_is_there(bands):
     close_holes(image, source, source == Source.NONE, relief, GSD, largest=0.05)
     assert (source[hole] == Source.FILLED).all()
     assert (image == 90).all()
+
+
+@pytest.mark.parametrize("before", [0.0, 0.3])
+def test_a_sliver_within_what_no_photo_sees_is_white_but_a_bar_before_it_is_drawn(before):
+    image, relief = np.full((60, 60), 90, np.uint8), np.zeros((60, 60), np.float32)
+    holes = np.zeros((60, 60), bool)
+    holes[10:50, 10:50] = True
+    sliver = np.s_[10:50, 28:31]
+    holes[sliver], relief[sliver] = False, before
+    source = np.where(holes, Source.NONE, Source.IMAGE_1).astype(np.uint8)
+    close_holes(image, source, holes, relief, GSD, largest=0.05)
+    assert (source[20:40, 12:26] == Source.NEITHER).all()
+    shown = Source.IMAGE_1 if before else Source.NEITHER
+    assert (source[15:45, 28:31] == shown).all()
+    assert (image[15:45, 28:31] == (90 if before else 255)).all()

@@ -8,21 +8,10 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from bifocal import Grid, Pair, Photo
 from bifocal.relief_maps import between_edges
 from bifocal.relief_maps.between_edges import BETWEEN_EDGES
 from bifocal.relief_maps.frame import Frame, zoom_map
-
-METRES = [[0.01, 0, -0.995], [0, -0.01, 0.995], [0, 0, 1]]
-FAR, NEAR = (Photo(plane_from_pixel=METRES, nadir=(0, 0), distance=d) for d in (17.5, 9.5))
-SIDE = 160
-
-
-def frame_of(image1: np.ndarray, image2: np.ndarray) -> Frame:
-    pair = Pair(image1=FAR, image2=NEAR)
-    grid = Grid.from_bounds((-4.0, -4.0, 4.0, 4.0), gsd=8.0 / SIDE)
-    seen = np.ones(grid.shape, bool)
-    return Frame(grid=grid, image1=image1, image2=image2, seen1=seen, seen2=seen, pair=pair)
+from tests.scenes.even_frames import NEAR, SIDE, frame_of
 
 
 def two_surfaces(noise: float = 0.0) -> tuple[Frame, np.ndarray]:
@@ -66,7 +55,7 @@ def test_a_mean_of_equal_values_is_that_value_whatever_the_weights():
     rows, columns = rng.uniform(0, 1, (2, 30, 40)).astype(np.float32)
     rows[:, -1], columns[-1] = 0, 0
     weight = rng.uniform(0.01, 1, (30, 40)).astype(np.float32)
-    mean = between_edges._Smoother(rows, columns).mean(np.full((30, 40), 1.25, np.float32), weight)
+    mean = between_edges.Smoother(rows, columns).mean(np.full((30, 40), 1.25, np.float32), weight)
     np.testing.assert_allclose(mean, 1.25, rtol=1e-5)
 
 
