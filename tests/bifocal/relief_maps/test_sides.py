@@ -64,6 +64,16 @@ def test_a_scrap_of_much_parallax_goes_though_camera_2_could_see_the_wall():
     np.testing.assert_allclose(settled(frame, relief, believed)[scrap], 0, atol=0.01)
 
 
+@pytest.mark.parametrize(("width", "height"), [(38, 4.5), (8, 0.0)])
+def test_what_goes_on_as_high_farther_out_is_the_inner_rim_of_a_raised_part(width, height):
+    frame, truth = board()
+    relief, believed = truth.copy(), np.ones(truth.shape, bool)
+    # No photo shows anything so high here, but a wide band is no scrap.
+    believed[40:120, :45] = False
+    relief[40:120, 38 - width : 38] = 4.5
+    np.testing.assert_allclose(settled(frame, relief, believed)[60:100, 31:37], height, atol=0.01)
+
+
 def test_a_board_that_nothing_validates_stays_where_both_photos_show_it():
     frame, truth = board()
     believed = np.ones(truth.shape, bool)
