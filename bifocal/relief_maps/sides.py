@@ -73,17 +73,25 @@ def settled(
     doubtful = raised & (hidden | (~goes_on & (parallax > SIDES.wide)))
     if not doubtful.any():
         return relief
-    fit = PhotoFit(frame, 0.0)
-    misfit = fit.misfit(relief)
-    # Of what camera 2 cannot see the photos say nothing: as good as what is validated.
-    misfit_behind = np.where(hidden, np.median(misfit[believed]), fit.misfit(behind))
-    vote = np.clip((misfit - misfit_behind) / np.float32(SIDES.misfit), -1, 1)
+    vote = _vote(frame, relief, behind, hidden, believed)
     threshold = _of_nearest((relief + behind) * np.float32(0.5), doubtful)
     side = np.where(doubtful, vote, np.where(relief > threshold, np.float32(-1), np.float32(1)))
+    del vote, threshold  # photos may be large
     weight = np.where(believed, np.float32(1), np.float32(BETWEEN_EDGES.doubtful))
     weight[doubtful] = SIDES.weight
     smoother = Smoother(*conductances(frame, relief * per_relief, believed))
     return np.where(doubtful & (smoother.mean(side, weight) > SIDES.majority), behind, relief)
+
+
+def _vote(
+    frame: Frame, relief: Float32Array, behind: Float32Array, hidden: BoolArray, believed: BoolArray
+) -> Float32Array:
+    """Return how far the photos speak for what is behind, -1 to 1."""
+    fit = PhotoFit(frame, 0.0)
+    misfit = fit.misfit(relief)
+    # Of what camera 2 cannot see the photos say nothing: as good as what is validated.
+    misfit_behind = np.where(hidden, np.median(misfit[believed]), fit.misfit(behind))
+    return np.clip((misfit - misfit_behind) / np.float32(SIDES.misfit), -1, 1)
 
 
 def _lowest(surface: Float32Array) -> Float32Array:
