@@ -421,7 +421,7 @@ def control_of(
         control = read_lengths(options.lengths, control)
     if options.length:
         _check_ends(options.length[0][0], sizes[0])
-        control = _with_length(control, options.length[0], options.site.sigma_control)
+        control = control.with_length(options.length[0], options.site.sigma_control)
     names = ("far", "near") if len(sizes) == 2 else [f"{k}." for k in range(1, len(sizes) + 1)]
     for pixels, size, photo in zip(control.picks, sizes, names, strict=False):
         check_inside(control.ids, pixels, size, photo)
@@ -452,26 +452,6 @@ def lengths_checked(
     wrong = disagreement(checks)
     doubts = [*wrong, *setup.get("doubts", ())]
     return {**setup, "length_checks": entries, "doubts": doubts}, wrong
-
-
-def _with_length(
-    control: Control, length: tuple[tuple[float, ...], float], sigma: float
-) -> Control:
-    """Return control with two more points on the wall and the length between them."""
-    count = len(control.ids)
-    ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
-    sigmas = np.full((2, 3), max(sigma, CONTROL.sigma_on_wall))
-    unseen = np.full((2, 2), np.nan)
-    return replace(
-        control,
-        ids=(*control.ids, "length, one end", "length, other end"),
-        xyz=np.concatenate([control.xyz, [[np.nan, np.nan, 0.0]] * 2]),
-        sigma=np.concatenate([control.sigma, sigmas]),
-        pixels1=np.concatenate([control.pixels1, ends]),
-        pixels2=np.concatenate([control.pixels2, unseen]),
-        more=tuple(np.concatenate([picks, unseen]) for picks in control.more),
-        lengths=(*control.lengths, (count, count + 1, length[1])),
-    )
 
 
 def _check_ends(ends: FloatArray | tuple[float, ...], size: tuple[int, int] | None) -> None:

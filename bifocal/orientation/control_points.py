@@ -140,6 +140,31 @@ class Control:
             pixels2=self.pixels2[rows], more=tuple(picks[rows] for picks in self.more),
         )  # fmt: skip
 
+    def with_length(self, length: tuple[tuple[float, ...], float], sigma: float) -> Control:
+        """Return control with two more points on the wall and the length between them.
+
+        Parameters
+        ----------
+        length : tuple
+            Column and row of both ends in photo 1 [px], and the metres between them.
+        sigma : float
+            Of control. [m]
+        """
+        count = len(self.ids)
+        ends = np.array(length[0], dtype=np.float64).reshape(2, 2)
+        sigmas = np.full((2, 3), max(sigma, CONTROL.sigma_on_wall))
+        unseen = np.full((2, 2), np.nan)
+        return replace(
+            self,
+            ids=(*self.ids, "length, one end", "length, other end"),
+            xyz=np.concatenate([self.xyz, [[np.nan, np.nan, 0.0]] * 2]),
+            sigma=np.concatenate([self.sigma, sigmas]),
+            pixels1=np.concatenate([self.pixels1, ends]),
+            pixels2=np.concatenate([self.pixels2, unseen]),
+            more=tuple(np.concatenate([picks, unseen]) for picks in self.more),
+            lengths=(*self.lengths, (count, count + 1, length[1])),
+        )
+
     @property
     def positioned(self) -> BoolArray:
         """Which points have X and Y, shape (n,)."""
