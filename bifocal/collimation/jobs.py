@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import json
+import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from bifocal.collimation.background import in_background
 from bifocal.collimation.wording import without_options
+from bifocal.collimation.work.tasks import JobTask
 from bifocal.remarks import remark
 from photocore.errors import InputError, PhotogrammetryError
 from photocore.remarks import learn
 
-#: Plain data, as it goes to the worker and comes back.
-Task = dict[str, Any]
 #: Jobs that are remembered; older ones are forgotten once they have ended.
 MOST_JOBS = 20
 #: A worker that was asked to end has this long. [s]
 TO_END = 10.0
+
+
+#: What the worker answers, as JSON holds it.
+Result = Mapping[str, object]
+
+
+class _Event(TypedDict, total=False):
+    """A line of the worker: how far it is, and at last its result or why there is none."""
+
+    progress: float
+    message: str
+    result: Result
+    error: str
 
 
 @dataclass(slots=True)
@@ -52,7 +65,7 @@ class PageJob:
     state: str = "running"
     progress: float = 0.0
     message: str = ""
-    process: subprocess.Popen[str] | None = None
+    process: subprocess.Popen[bytes] | None = None
     quiet: bool = False
     ended_at: int = 0
 
@@ -102,8 +115,8 @@ class JobRunner:
     def start(
         self,
         kind: str,
-        task_of: Callable[[], Task],
-        finish: Callable[[Task, Task], str],
+        task_of: Callable[[], JobTask],
+        finish: Callable[[JobTask, Result], str],
         *,
         quiet: bool = False,
         first: Callable[[], object] = lambda: None,
@@ -180,7 +193,7 @@ class JobRunner:
             thread.join(timeout=TO_END)
 
     def _run(
-        self, job: PageJob, task: Task, finish: Callable[[Task, Task], str],
+        self, job: PageJob, task: JobTask, finish: Callable[[JobTask, Result], str],
         first: Callable[[], object],
     ) -> None:  # fmt: skip
         if job.state == "running":
@@ -192,7 +205,7 @@ class JobRunner:
         try:
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                text=True, encoding="utf-8", cwd=Path.cwd(),
+                cwd=Path.cwd(),
             )  # fmt: skip
         except OSError as error:
             self._fail(job, remark("page.job_not_started", why=error.strerror))
@@ -211,13 +224,13 @@ class JobRunner:
         else:
             self._fail(job, answer.get("error") or remark("page.job_without_result"))
 
-    def _follow(self, job: PageJob, process: subprocess.Popen[str], task: Task) -> dict[str, Any]:
+    def _follow(self, job: PageJob, process: subprocess.Popen[bytes], task: JobTask) -> _Event:
         """Return the last line of a worker, telling its progress meanwhile."""
         assert process.stdin is not None
         assert process.stdout is not None
-        answer: dict[str, Any] = {}
+        answer = _Event()
         try:
-            process.stdin.write(json.dumps(task))
+            process.stdin.write(pickle.dumps(task))
             process.stdin.close()
         except OSError:
             return answer

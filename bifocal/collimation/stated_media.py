@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
-
-import numpy as np
 
 from bifocal.model import Pair, PairMedia
-from multimedia import Layers
 
 #: Fields of the set-up that say what lies between the cameras and the wall: indices of refraction,
 #: lengths in metres. Beginning with air; glass may be absent.
@@ -65,27 +61,3 @@ def _of_pair(pair: Pair) -> PairMedia:
         return media
     normals = (pair.image1.interface_normal, pair.image2.interface_normal)
     return replace(media, normals=normals, turning=(False, False))
-
-
-def media_as_dict(media: PairMedia) -> dict[str, object] | None:
-    """Return media as plain data, for the process of a job."""
-    if not media:
-        return None
-    normals = [None if normal is None else np.asarray(normal).tolist() for normal in media.normals]
-    return {
-        **media.layers.as_dict(), "port": media.port, "depth": media.depth, "normals": normals,
-        "sigmas": dict(media.sigmas),
-    }  # fmt: skip
-
-
-def media_from_dict(data: Mapping[str, Any] | None) -> PairMedia:
-    """Return the media of `media_as_dict`."""
-    if data is None:
-        return PairMedia.none()
-    layers = Layers(indices=tuple(data["indices"]), thicknesses=tuple(data["thicknesses"]))
-    first, second = (None if n is None else np.array(n) for n in data["normals"])
-    port = data["port"] and (data["port"][0], data["port"][1])
-    return PairMedia(
-        layers=layers, port=port, depth=data["depth"], normals=(first, second),
-        sigmas=data["sigmas"],
-    )  # fmt: skip

@@ -8,13 +8,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bifocal.collimation import job_process, jobs
+from bifocal.collimation import jobs
 from bifocal.collimation.background import in_background
 from bifocal.collimation.jobs import JobRunner, PageJob
+from bifocal.collimation.work import matching
+from bifocal.collimation.work.tasks import MatchTask, TargetsTask
 from tests.conftest import Unforeseen
 
 
@@ -26,7 +29,7 @@ class Worker:
 
     def __init__(self, *_: object, **__: object) -> None:
         type(self).started += 1
-        self.stdin = io.StringIO()
+        self.stdin = io.BytesIO()
         self._ended = threading.Event()
         self.stdout: Any = self._lines()
 
@@ -132,9 +135,9 @@ def test_stopping_kills_a_worker_that_does_not_hear(
 def test_what_is_offered_as_targets_is_no_feature(monkeypatch: pytest.MonkeyPatch) -> None:
     points = [{"name": name, "code": code} for name, code in (("A", "target"), ("B", "feature"))]
 
-    def matched(task: dict[str, Any], _progress: object) -> dict[str, Any]:
-        assert not task["features"]
+    def matched(task: MatchTask, _progress: object) -> dict[str, Any]:
+        assert not task.features
         return {"points": points}
 
-    monkeypatch.setattr(job_process, "_match", matched)
-    assert job_process._targets({"pair": "a.json"}, print)["points"] == points[:1]
+    monkeypatch.setattr(matching, "match", matched)
+    assert matching.targets(TargetsTask(pair=Path("a.json")), print)["points"] == points[:1]

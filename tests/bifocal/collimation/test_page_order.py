@@ -15,6 +15,7 @@ from bifocal.collimation.job_tasks import start_job
 from bifocal.collimation.product_graph import causes_of
 from bifocal.collimation.server.uploads import far_first
 from bifocal.collimation.shapes import places_of
+from bifocal.collimation.work.tasks import AlignTask
 from photocore.images import ImageInfo
 from tests.page_session import client_of, opened, pick, pick_both, sample_folder, sample_picks
 
@@ -220,13 +221,13 @@ def test_an_exchange_that_a_job_found_is_undone_and_redone_exactly(
 def test_a_job_writes_over_no_orientation_that_was_proposed_before(
     folder, monkeypatch, quiet: bool
 ) -> None:
-    tasks: list[dict] = []
+    tasks: list[AlignTask] = []
     with begun(folder) as session:
         monkeypatch.setattr(session.jobs, "start", lambda _, task, *__, **___: tasks.append(task()))
         start_job(session, "align", {"way": "auto"}, quiet=quiet)
-        Path(tasks[0]["out"]).write_text("{}")
+        tasks[0].out.write_text("{}")
         start_job(session, "align", {"way": "auto"}, quiet=quiet)
-    assert tasks[0]["out"] != tasks[1]["out"]
+    assert tasks[0].out != tasks[1].out
 
 
 def test_shapes_go_with_an_exchange_to_the_same_place_of_the_wall(folder) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from bifocal import SAMPLE, Pair, ReliefMap
 from bifocal.collimation.job_tasks import finish, task_of
-from bifocal.collimation.product_graph import causes_of, out_of_date
+from bifocal.collimation.product_graph import out_of_date
 from bifocal.collimation.wording import without_options
 from bifocal.files.made_from import MadeFrom
 from bifocal.remarks import remark
@@ -31,7 +31,7 @@ def survey(tmp_path):
 
 def make(session, kind):
     """Let a job end whose files are written here."""
-    task = task_of(session, kind, {}) | {"causes": causes_of(session, kind)}
+    task = task_of(session, kind, {})
     folder = session.files.folder
     if kind == "relief":
         relief = np.full((4, 6), len(session.state.shapes) / 10.0, np.float32)
@@ -84,7 +84,9 @@ def test_a_face_drawn_since_leaves_relief_and_package_behind_and_out(survey):
 
 def test_everything_made_again_begins_with_what_is_out_of_date(survey):
     survey.command({"op": "shape.set", "kind": "face", "corners": DOOR})
-    assert list(task_of(survey, "deliver", {})["before"]) == ["relief", "ortho"]
+    task = task_of(survey, "deliver", {})
+    assert task.relief_first
+    assert task.ortho_first
     make(survey, "relief")
     assert out_of_date(survey) == {"deliver": ["faces", "relief"]}
     make(survey, "deliver")
@@ -121,9 +123,8 @@ def control(session, name, x, at):
 
 def proposed(session, **report):
     """Let *Align* end with the sample's pair, and what it has to report."""
-    task = task_of(session, "align", {}) | {"causes": causes_of(session, "align")}
-    task["out"] = str(session.files.folder / "facade.proposed.pair.json")
-    shutil.copyfile(SAMPLE / "facade.pair.json", task["out"])
+    task = task_of(session, "align", {})
+    shutil.copyfile(SAMPLE / "facade.pair.json", task.out)
     finish(session, task, {"remarks": [], "control": [], **report})
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -79,7 +77,7 @@ def test_the_frame_goes_into_the_pair_that_is_aligned(tmp_path) -> None:
     with opened(sample_folder(tmp_path)) as session:
         session.command({"op": "control.paste", "text": listed(pixels=True)})
         task = task_of(session, "align", {"way": "control"})
-    options = AlignOptions(control=Path(task["control"]), world=WorldFrame.from_json(task["world"]))
+    options = AlignOptions(control=task.options.control, world=task.options.world)
     control = control_of(options, [(1536, 1024)] * 2, ("far.jpg", "near.jpg"))
     np.testing.assert_allclose(control.frame.to_world(control.xyz), WORLD, atol=2e-4)
 

@@ -72,8 +72,8 @@ def test_every_further_taped_length_checks_the_scale_and_is_told_in_the_package(
         session.command({"op": "undo"})
         assert session.pictures.pair.d1 == pair.d1  # what checks gives no scale
         session.command({"op": "align.accept"})
-        told = task_of(session, "deliver", {})["lengths"]
-        assert told["K1"]["measured"] == pytest.approx(truth)
+        told = task_of(session, "deliver", {}).lengths
+        assert told["K1"].measured == pytest.approx(truth)
         assert set(told) == {"K1", "K2"}
 
 

@@ -16,11 +16,15 @@ from PIL import Image
 
 from bifocal import SAMPLE, InputError, Pair, Photo, PhotoSet, ReliefMap
 from bifocal.campaigns.verification import verify
-from bifocal.collimation import job_process, job_tasks
+from bifocal.collimation.job_results import finish
+from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.live_orientation import control_of, live_orientation
+from bifocal.collimation.orienting_tasks import with_tables
 from bifocal.collimation.project import find_files
 from bifocal.collimation.records import PickedControl, SurveyState
+from bifocal.collimation.work import making
 from bifocal.collimation.workbook.profile_book import HEADINGS
+from bifocal.orientation.align_workflow import AlignOptions
 from bifocal.orientation.control_points import read_lengths
 from photocore.images import image_info
 from tests.page_session import (
@@ -430,17 +434,11 @@ def test_a_drawing_without_title_is_called_as_its_pair_file(tmp_path, monkeypatc
         titles.append(given[3].title)
         raise InputError("enough")
 
-    monkeypatch.setattr(job_process, "deliver", noted)
-    monkeypatch.setattr(job_process, "_ortho_task", lambda task: task)
-    blank = dict.fromkeys(["title", "mark", "overwrite"])
-    task = {
-        **blank,
-        "drawing": {},
-        "pair": str(sample_folder(tmp_path) / "facade.pair.json"),
-        "out": "d",
-    }
+    monkeypatch.setattr(making, "deliver", noted)
+    with opened(sample_folder(tmp_path)) as session:
+        task = replace(task_of(session, "deliver", {}), relief_first=None, ortho_first=None)
     with pytest.raises(InputError, match="enough"):
-        job_process._deliver(task, lambda *_: None)
+        making.make_sheets(task, lambda *_: None)
     assert titles == ["facade"]
 
 
@@ -453,8 +451,8 @@ def test_a_tape_weighs_as_it_is_said_to_be_good(tmp_path) -> None:
         session.command({**tape, "to": "B", "sigma": 0.05})
         session.command({**tape, "to": "C"})
         control = control_of(session.state)
-        tables = job_tasks._write_control(session, control)
-        read = read_lengths(tables["lengths"], replace(control, lengths=(), sigma_lengths=()))
+        tables = with_tables(session, control, AlignOptions())
+        read = read_lengths(tables.lengths, replace(control, lengths=(), sigma_lengths=()))
     assert read.lengths == control.lengths == ((0, 1, 4.4), (0, 2, 4.4))
     for found in (read, control):
         assert found.sigma_lengths == pytest.approx((0.05, np.nan), nan_ok=True)
@@ -487,13 +485,13 @@ def test_the_precision_of_a_place_is_that_of_its_pixel_up_to_the_rim(tmp_path) -
 
 def test_sheets_are_delivered_with_a_drawing_of_the_points_that_are_picked(tmp_path) -> None:
     folder, picks = sample_folder(tmp_path), sample_picks()
-    task = {"kind": "deliver", "out": str(folder / "sheets")}
     (folder / "sheets").mkdir()
     with opened(folder) as session:
-        job_tasks.finish(session, task, {"made": {}, "files": []})
+        task = replace(task_of(session, "deliver", {}), out=folder / "sheets")
+        finish(session, task, {"made": {}, "files": []})
         assert not list((folder / "sheets").iterdir())
         pick_both(session, "T01", picks["T01"])
-        job_tasks.finish(session, task, {"made": {}, "files": []})
+        finish(session, task, {"made": {}, "files": []})
         (drawing,) = (folder / "sheets").iterdir()
         row = session.results.row(session.state.points["T01"])
     (point,) = ezdxf.readfile(drawing).modelspace().query("POINT")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import pickle
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,10 @@ import pytest
 
 from bifocal import SAMPLE
 from bifocal.collimation.first_orientation import FirstOrientation
-from bifocal.collimation.job_process import _WORKS
-from bifocal.collimation.job_tasks import finish, start_job, task_of
+from bifocal.collimation.job_results import finish
+from bifocal.collimation.job_tasks import start_job, task_of
 from bifocal.collimation.project import find_files
+from bifocal.collimation.work.orienting import rectify
 from bifocal.model.geotiff import RasterReader
 from bifocal.model.pair import Pair
 from bifocal.model.photo_set import PhotoSet
@@ -97,9 +100,9 @@ def test_what_joined_is_the_pair_and_what_is_made_is_of_the_set(tmp_path: Path) 
         client = client_of(session)
         client.post("/api/photos", files=sent(("third.jpg", THIRD)))
         task = task_of(session, "join", {})
-        assert [Path(path).name for path in task["photos"]] == ["far.jpg", "near.jpg", "third.jpg"]
+        assert [path.name for path in task.photos] == ["far.jpg", "near.jpg", "third.jpg"]
         made = write_set(folder, moved=0.25)
-        said = finish(session, {**task, "out": str(made)}, {"lenses": [], "remarks": ["Good."]})
+        said = finish(session, replace(task, out=made), {"lenses": [], "remarks": ["Good."]})
         assert said == "Good."
         shown = client.get("/api/state").json()
         assert shown["others"][0] == {
@@ -112,8 +115,8 @@ def test_what_joined_is_the_pair_and_what_is_made_is_of_the_set(tmp_path: Path) 
         np.testing.assert_array_equal(session.accepted_pair.image1.plane_from_pixel, own)
         for kind in ("relief", "ortho", "deliver"):
             told = task_of(session, kind, {"image": "1"})
-            assert told["set"] == str(made.resolve())
-            assert "image" not in told.get("options", {})
+            assert told.photo_set == made.resolve()
+            assert "image" not in told.settings
         names = client.get("/api/state").json()["products"]["files"]
         assert made.name in [file["name"] for file in names]
         # Another photo, and the set is none of these any more.
@@ -152,15 +155,13 @@ def test_one_photo_alone_comes_to_scale_by_a_rectangle(tmp_path: Path) -> None:
         for wrong in ({**given, "width": None}, {**given, "corners": corners[:3]}):
             with pytest.raises(InputError, match="rectangle"):
                 task_of(session, "rectify", wrong)
-        task = json.loads(json.dumps(task_of(session, "rectify", given)))
-        result = _WORKS["rectify"](task, lambda *_: None)
+        task = pickle.loads(pickle.dumps(task_of(session, "rectify", given)))
+        result = json.loads(json.dumps(plain(rectify(task, lambda *_: None))))
         said = finish(session, task, result)
         assert "displaced" in said
         assert np.abs(client.get("/api/state").json()["misfits"]).max() < 0.1
         skew = np.add(corners, [[0, 0], [4, 0], [0, 0], [0, 0]])
-        off = _WORKS["rectify"](
-            {**task, "corners": skew.tolist(), "overwrite": True}, lambda *_: None
-        )
+        off = rectify(replace(task, corners=skew, overwrite=True), lambda *_: None)
         # One corner moved against a fitting rectangle: all four miss it, by no more than that.
         assert 0.3 < np.linalg.norm(off["misfits"], axis=1).max() < 4
         shown = client.get("/api/state").json()["products"]

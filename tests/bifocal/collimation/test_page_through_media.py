@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
 import subprocess
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ import pytest
 from bifocal import Pair, solve
 from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.pyramids import RectifiedPhoto, max_level
-from bifocal.collimation.stated_media import media_from_dict, media_of
+from bifocal.collimation.stated_media import media_of
 from bifocal.matching.suggestions import radial_line, seen_in_other, suggest
 from tests.bifocal.model.test_pair_through_media import PAIRS, content
 from tests.bifocal.model.test_pair_through_media import POINTS as WIDE
@@ -215,8 +216,8 @@ def test_media_are_typed_on_the_page_and_what_lacks_is_said(tmp_path):
         state = typed(d1=3.5, d2=1.9).json()["state"]
         assert (state["setup"]["water_index"], state["setup"]["port"]) == (1.337, 0.05)
         task = task_of(session, "align", {})
-        assert (task["as_set_up"], task["auto"]) == (True, False)
-        media = media_from_dict(json.loads(json.dumps(task["media"])))
+        assert (task.options.as_set_up, task.options.auto) == (True, False)
+        media = pickle.loads(pickle.dumps(task)).options.media
         assert media.layers.indices == (1.0, 1.49, 1.337)
         assert (media.layers.thicknesses, media.port, media.sigmas) == ((0.01,), (0.05, 0.05), {})
         typed(sigma_water_index=0.003)
@@ -235,7 +236,7 @@ def test_a_pair_that_came_with_media_is_oriented_through_them_again(name, tmp_pa
             for image, pixel in enumerate((one, two), start=1):
                 pick = {"image": image, "column": pixel[0], "row": pixel[1]}
                 session.command({"op": "control.pick", "name": f"C{row}", **pick})
-        media = media_from_dict(json.loads(json.dumps(task_of(session, "align", {})["media"])))
+        media = pickle.loads(pickle.dumps(task_of(session, "align", {}))).options.media
         assert media.layers == pair.layers
         for number, photo in enumerate((pair.image1, pair.image2)):
             camera = SimpleNamespace(centre=[*photo.nadir, photo.distance])
@@ -247,4 +248,4 @@ def test_a_pair_that_came_with_media_is_oriented_through_them_again(name, tmp_pa
                 np.testing.assert_allclose(found, own / np.linalg.norm(own), atol=1e-15)
         session.command({"op": "setup.set", "water_index": 1.337})
         session.command({"op": "setup.set", "water_index": None})
-        assert task_of(session, "align", {})["media"] is None
+        assert not task_of(session, "align", {}).options.media

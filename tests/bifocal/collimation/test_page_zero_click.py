@@ -7,6 +7,7 @@ import io
 import json
 import os
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ import pytest
 from bifocal import SAMPLE, InputError, Pair, ReliefMap
 from bifocal.collimation import first_orientation
 from bifocal.collimation.first_orientation import FirstOrientation
-from bifocal.collimation.job_tasks import finish
+from bifocal.collimation.job_results import finish
+from bifocal.collimation.job_tasks import task_of
 from bifocal.collimation.proposals import wall_sheet
 from bifocal.collimation.server.uploads import take_photos
 from bifocal.collimation.shapes import met, places_of
 from bifocal.collimation.starting import RECENT, recent, remember, reopen
+from bifocal.collimation.work.tasks import TargetsTask
 from bifocal.faces.faces import Face, Faces
 from tests.page_session import client_of, opened, proposed, sample_folder, two_photos
 
@@ -172,7 +175,7 @@ def test_what_is_drawn_lies_beside_the_pair_and_comes_back(tmp_path) -> None:
         assert shown[1]["width"] == pytest.approx(200 * 0.00738, abs=1e-4)
         assert shown[1]["area"] == pytest.approx(200 * 300 * 0.00738**2, rel=1e-4)
         (folder / "d").mkdir()
-        task = {"kind": "deliver", "out": str(folder / "d")}
+        task = replace(task_of(session, "deliver", {}), out=folder / "d")
         finish(session, task, {"files": [], "made": {}})
         table = (folder / "d" / "facade_outlines.csv").read_text().splitlines()
         assert table[0].startswith("id,layer,width [m],height [m],area [m2]")
@@ -250,7 +253,9 @@ def test_targets_that_were_found_become_control_points_once(tmp_path) -> None:
     with opened(sample_folder(tmp_path)) as session:
         session.command({"op": "control.pick", "name": "T001", "image": 1, "column": 1, "row": 1})
         for count in ("1", "No targets"):
-            assert count in finish(session, {"kind": "targets"}, {"points": [found]})
+            assert count in finish(
+                session, TargetsTask(pair=Path("wall.pair.json")), {"points": [found]}
+            )
         assert sorted(session.state.control) == ["T001", "T001b"]
         session.command({"op": "undo"})
         assert sorted(session.state.control) == ["T001"]

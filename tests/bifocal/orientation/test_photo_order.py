@@ -135,7 +135,7 @@ def test_both_distances_are_taken_the_same_way_by_page_and_command(tmp_path) -> 
     folder = sample_folder(tmp_path)
     with opened(folder / "far.jpg", folder / "near.jpg") as session:
         session.command({"op": "setup.set", "d1": 17.5, "d2": 9.5})
-        assert task_of(session, "align", {})["auto"]
+        assert task_of(session, "align", {}).options.auto
 
 
 @pytest.mark.acceptance
