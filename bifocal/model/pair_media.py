@@ -170,8 +170,8 @@ class PairMedia:
         )
 
     def __bool__(self) -> bool:
-        """Whether there are media at all."""
-        return self.layers is not AIR
+        """Whether there are media at all: also those of another process, by their values."""
+        return self.layers != AIR or bool(self.sigmas)
 
     @property
     def leaning(self) -> bool:

@@ -1,6 +1,7 @@
 """Pairs that look through glass and water: projection, intersection, precision, the pair file."""
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import bifocal
 from bifocal import GeometryError, InputError, MediaPath, Pair
 from bifocal.media import interface_axes
+from bifocal.model.pair_media import PairMedia
 from bifocal.model.ray_field import RayField
 from bifocal.rays import object_rays, plane_position, straight
 from multimedia import Layers
@@ -143,6 +145,11 @@ def test_media_of_one_index_are_air():
             getattr(one, field), getattr(other, field), rtol=1e-9, atol=1e-12
         )
     assert one.flags == other.flags
+
+
+def test_no_media_are_none_in_another_process_too():
+    assert not PairMedia.none()
+    assert not pickle.loads(pickle.dumps(PairMedia.none()))
 
 
 def test_a_port_that_leans_by_nothing_is_parallel():
