@@ -8,14 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.orientation_precision import CAMERA
-from bifocal.orientation.adjustment.frame_turn import line_equations
-from bifocal.orientation.facade_lines import FacadeDirection
+from bifocal.model import CAMERA, Interior
+from bifocal.orientation import FacadeDirection, line_equations
 from photocore.adjustment.network import NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.pinhole import Pinhole
-from photocore.camera.rotation import skew
+from photocore.camera import Pinhole, skew
 
 #: What is interior, by its place in `CAMERA`; what of it is one unknown for all photos of a lens.
 #: Focus, stabiliser and crop move the principal point from photo to photo.

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from bifocal.model.orientation_precision import CAMERA
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import CAMERA, PairMedia
 from bifocal.networks.camera_knowledge import SHARED
 from bifocal.networks.joint_observations import JointObservations, with_enough_rays, with_rays
 from photocore.adjustment import Fit, huber_weights, outlier_limit, standardised
@@ -22,7 +21,7 @@ from photocore.adjustment.blocks import BlockEquations
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.adjustment.sparse import SparseEquations
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.pinhole import PARAMETERS, Pinhole
+from photocore.camera import PARAMETERS, Pinhole
 from photocore.errors import GeometryError
 
 #: What is unknown of a camera, by its place in `CAMERA`; the focal length comes first.

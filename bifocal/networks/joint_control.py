@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.pair import Pair
-from bifocal.model.world_frame import WorldFrame
+from bifocal.model import Pair, WorldFrame
 from bifocal.networks.joint_ties import SharedPoints
-from bifocal.orientation.control_points import Control, read_control
-from bifocal.orientation.tuning import CONTROL
+from bifocal.orientation import CONTROL, Control, read_control
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
 from photocore.errors import InputError

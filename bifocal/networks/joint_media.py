@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.matching.features import Features
-from bifocal.model.homography import apply_homography
-from bifocal.model.pair_media import PairMedia
-from bifocal.model.photo import Photo
+from bifocal.matching import Features
+from bifocal.model import PairMedia, Photo, apply_homography
 from bifocal.rays import seen_distance
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import Pinhole
 
 
 def highest_relief(cameras: Sequence[Pinhole], media: PairMedia) -> float:

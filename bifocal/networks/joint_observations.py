@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import PairMedia
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from photocore.arrays import BoolArray, FloatArray, IntArray
 

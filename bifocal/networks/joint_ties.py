@@ -9,13 +9,12 @@ from itertools import combinations, pairwise
 import cv2
 import numpy as np
 
-from bifocal.matching.features import Features, alike, match_features, spread_evenly
-from bifocal.model.pair_media import PairMedia
+from bifocal.matching import Features, alike, match_features, spread_evenly
+from bifocal.model import PairMedia
 from bifocal.networks.joint_adjustment import JointUnknowns
 from bifocal.networks.joint_media import highest_relief
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.pinhole import Pinhole
-from photocore.camera.similarity import Similarity, fit_plane
+from photocore.camera import Pinhole, Similarity, fit_plane
 from photocore.errors import GeometryError
 
 Media = Sequence[PairMedia]

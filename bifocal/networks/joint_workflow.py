@@ -10,12 +10,18 @@ from typing import TypedDict
 
 import numpy as np
 
-from bifocal.files.photos import photo_info
-from bifocal.matching.features import Features, find_features
-from bifocal.model.orientation_precision import NAMES, as_dict, exchanged, pinhole
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia, stated_by_photo
-from bifocal.model.photo import Photo
+from bifocal.files import photo_info
+from bifocal.matching import Features, find_features
+from bifocal.model import (
+    NAMES,
+    Pair,
+    PairMedia,
+    Photo,
+    as_dict,
+    exchanged,
+    pinhole,
+    stated_by_photo,
+)
 from bifocal.networks.joint_adjustment import Blunder, JointAdjustment, adjust_jointly
 from bifocal.networks.joint_control import NamedPositions, name_of, named_positions
 from bifocal.networks.joint_media import refracted_again, straightened
@@ -27,7 +33,7 @@ from bifocal.networks.joint_ties import (
     near_each_other,
 )
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import Pinhole, plane_from_pixel
+from photocore.camera import Pinhole, plane_from_pixel
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError, located
 from photocore.images import read_grey

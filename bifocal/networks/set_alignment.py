@@ -9,19 +9,20 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.diagnostics import Diagnostics, deviations_by_photo
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.orientation_precision import CAMERA, moved
-from bifocal.model.pair_media import PairMedia
-from bifocal.model.photo_set import PhotoSet
+from bifocal.model import (
+    CAMERA,
+    Diagnostics,
+    Interior,
+    PairMedia,
+    PhotoSet,
+    deviations_by_photo,
+    moved,
+)
 from bifocal.networks.photo_influence import dragging_photo
 from bifocal.networks.set_orientation import OrientedSet, orient_set
+from bifocal.orientation import REMARKS, Control, PhotoInput, SiteMeasures, zero_sigma
 from bifocal.orientation.alignment import Alignment, facade_axes, lens_of, photo_of, radial_units
-from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.orientation_stages import PhotoInput
 from bifocal.orientation.photo_alignment import align, photo_input
-from bifocal.orientation.tuning import REMARKS
-from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import FloatArray

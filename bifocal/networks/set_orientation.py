@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.matching.features import Features, find_features, spread_evenly
+from bifocal.matching import Features, find_features, spread_evenly
 from bifocal.networks.camera_knowledge import CameraKnowledge
 from bifocal.networks.joint_adjustment import (
     JointAdjustment,
@@ -18,24 +18,28 @@ from bifocal.networks.joint_adjustment import (
 from bifocal.networks.joint_observations import JointObservations, with_rays
 from bifocal.networks.joint_ties import SharedPoints, common_features
 from bifocal.networks.set_start import FirstCameras, first_cameras_of, meeting
-from bifocal.orientation import validation
-from bifocal.orientation.adjustment.frame_turn import turned_by_lines
-from bifocal.orientation.adjustment.pair_observations import (
+from bifocal.orientation import (
     INDEPENDENT,
+    TIES,
+    WALLS,
+    Control,
+    FacadeDirection,
     PairObservations,
     PairUnknowns,
+    PhotoInput,
+    SiteMeasures,
+    frame_of,
+    largest_plane,
+    narrow_face,
+    refine_ties,
+    turned_by_lines,
+    validation,
 )
-from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.facade_lines import FacadeDirection
-from bifocal.orientation.orientation_stages import PhotoInput
-from bifocal.orientation.tie_points import refine_ties
-from bifocal.orientation.tuning import TIES, WALLS
-from bifocal.orientation.walls.reference_plane import frame_of, largest_plane, narrow_face
 from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import project_with_jacobian, ray_on_plane
+from photocore.camera import project_with_jacobian, ray_on_plane
 from photocore.cli import Progress, no_progress
 from photocore.errors import GeometryError
 

@@ -9,16 +9,20 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from bifocal.model.interior_orientation import SAME_FOCAL, SIGMA_RADIAL, Interior
+from bifocal.model import SAME_FOCAL, SIGMA_RADIAL, Interior
 from bifocal.networks.joint_ties import FEWEST_MATCHES, SharedPoints
-from bifocal.orientation.absolute_orientation import orient_pair
-from bifocal.orientation.control_points import Control, SiteMeasures
-from bifocal.orientation.orientation_stages import OrientedPair, PhotoInput
-from bifocal.orientation.starts.space_resection import resect
-from bifocal.orientation.tuning import VALIDATION
+from bifocal.orientation import (
+    VALIDATION,
+    Control,
+    OrientedPair,
+    PhotoInput,
+    SiteMeasures,
+    orient_pair,
+    resect,
+)
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.pinhole import Pinhole, camera_matrix, homogeneous, ray_on_plane
+from photocore.camera import Pinhole, camera_matrix, homogeneous, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError
 
 #: So many pairs are tried, the most promising first.

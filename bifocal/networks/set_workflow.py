@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.world_frame import world_entry
+from bifocal.model import PhotoSet, world_entry
 from bifocal.networks.set_alignment import SetAlignment, set_alignment
 from bifocal.networks.set_orientation import orient_set
+from bifocal.orientation import PhotoInput
 from bifocal.orientation.align_workflow import (
     AlignOptions,
     aligned_photos,
@@ -20,7 +20,6 @@ from bifocal.orientation.align_workflow import (
     lengths_checked,
     way_of,
 )
-from bifocal.orientation.orientation_stages import PhotoInput
 from photocore.cli import Progress, no_progress
 from photocore.errors import InputError
 from photocore.images import image_info, read_grey

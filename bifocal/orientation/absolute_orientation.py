@@ -10,9 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.model.doubts import CERTAIN
-from bifocal.model.interior_orientation import with_one_lens
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import CERTAIN, PairMedia, with_one_lens
 from bifocal.orientation import validation
 from bifocal.orientation.adjustment.pair_observations import PairObservations, PairUnknowns
 from bifocal.orientation.approximate_orientation import (

@@ -9,17 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.files.exif_judge import NOMINAL, judged_focal, middle_aside, sensors_apart
-from bifocal.files.haze import read_greys
-from bifocal.model.basis import rests_on
-from bifocal.model.diagnostics import Diagnostics
-from bifocal.model.interior_orientation import Interior, lens_of_photo
-from bifocal.model.length_checks import check_in_set, disagreement
-from bifocal.model.lens import Lens
-from bifocal.model.pair_media import PairMedia
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.model.photo_set import PhotoSet
-from bifocal.model.world_frame import WorldFrame, world_entry
+from bifocal.files import NOMINAL, judged_focal, middle_aside, read_greys, sensors_apart
+from bifocal.model import (
+    FARTHEST_WALL,
+    Diagnostics,
+    Interior,
+    Lens,
+    PairMedia,
+    PhotoSet,
+    WorldFrame,
+    check_in_set,
+    disagreement,
+    lens_of_photo,
+    rests_on,
+    world_entry,
+)
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment, with_files
 from bifocal.orientation.alignment_picture import write_alignment_picture

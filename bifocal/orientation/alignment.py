@@ -8,15 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.diagnostics import Diagnostics, WallZone
-from bifocal.model.doubts import MISFITS, doubts_of
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Cameras, Interior
-from bifocal.model.lens import Lens
-from bifocal.model.orientation_precision import CAMERA, NAMES, moved
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia, stated_by_photo
-from bifocal.model.photo import Photo
+from bifocal.model import (
+    CAMERA,
+    MISFITS,
+    NAMES,
+    Cameras,
+    Diagnostics,
+    Interior,
+    Lens,
+    Pair,
+    PairMedia,
+    Photo,
+    WallZone,
+    apply_homography,
+    doubts_of,
+    moved,
+    stated_by_photo,
+)
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
 from bifocal.orientation.facade_lines import facade_rotation
@@ -30,8 +38,7 @@ from bifocal.orientation.walls.reference_plane import zero_sigma
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole, camera_matrix, plane_from_pixel
+from photocore.camera import Pinhole, RadialDivision, camera_matrix, plane_from_pixel
 from photocore.remarks import alarms_in
 
 

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bifocal.model.interior_orientation import Images
-from bifocal.model.photo import Photo
+from bifocal.model import Images, Photo
 from bifocal.orientation.alignment import Alignment
 from bifocal.orientation.area_points import resampled
 from photocore.arrays import ByteArray, FloatArray

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.matching.features import Features, find_features
-from bifocal.matching.pick_evidence import PickVerdict, held_against_photos
-from bifocal.model.interior_orientation import Cameras, Interiors
-from bifocal.model.pair_media import PairMedia
+from bifocal.matching import Features, PickVerdict, find_features, held_against_photos
+from bifocal.model import Cameras, Interiors, PairMedia
 from bifocal.orientation import validation
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.control_points import Control, SiteMeasures
@@ -31,8 +29,7 @@ from bifocal.orientation.tuning import CONTROL
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import BoolArray
-from photocore.camera.pinhole import fundamental, ray_on_plane
-from photocore.camera.similarity import Similarity, fit_plane
+from photocore.camera import Similarity, fit_plane, fundamental, ray_on_plane
 from photocore.errors import GeometryError, located
 
 

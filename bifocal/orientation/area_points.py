@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.interior_orientation import Images
+from bifocal.model import Images
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from bifocal.orientation.tuning import AREA
 from photocore.arrays import BoolArray, ByteArray, FloatArray
-from photocore.camera.pinhole import project
+from photocore.camera import project
 
 
 def even_points(

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.hypotheses import SCALE_TOLERANCE
-from bifocal.model.interior_orientation import Cameras
-from bifocal.model.orientation_precision import NAMES
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import NAMES, SCALE_TOLERANCE, Cameras, PairMedia
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations, at
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_stages import OrientedPair, Photos
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import Pinhole
 from photocore.errors import InputError
 
 

@@ -9,8 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from bifocal.model.photo import FARTHEST_WALL
-from bifocal.model.world_frame import WorldFrame, frame_of, lies_how
+from bifocal.model import FARTHEST_WALL, WorldFrame, frame_of, lies_how
 from bifocal.remarks import remark
 from photocore.arrays import FloatArray
 from photocore.errors import CellError, InputError, WorkbookError

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifocal.model.points import Points
-from bifocal.model.world_frame import WorldFrame
+from bifocal.model import Points, WorldFrame
 from bifocal.orientation.control_lists import (
     ListedPoints,
     in_plane_frame,

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
+from bifocal.model import Cameras, Images, Interior, Interiors, apply_homography
 from bifocal.orientation.tuning import LINES
 from bifocal.remarks import remark
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera.distortion import RadialDivision
-from photocore.camera.pinhole import Pinhole, plane_from_pixel
-from photocore.camera.rotation import nearest_rotation, rotation_from_vector
+from photocore.camera import (
+    Pinhole,
+    RadialDivision,
+    nearest_rotation,
+    plane_from_pixel,
+    rotation_from_vector,
+)
 from photocore.errors import GeometryError
 
 #: How far the lines of a façade as a whole come out of its wall. On two real pairs (church_1,

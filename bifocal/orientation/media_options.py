@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.pair_media import LEANS, Normal, PairMedia
+from bifocal.model import LEANS, Normal, PairMedia
 from bifocal.options import PairMediaOptions
 from bifocal.remarks import remark
 from photocore.adjustment.priors import parse_prior

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import PairMedia
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.remarks import remark
 from photocore.adjustment import correlations

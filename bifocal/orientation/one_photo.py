@@ -8,10 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifocal.files.exif_judge import is_odd
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.photo import Photo
-from bifocal.model.photo_alone import PhotoAlone
+from bifocal.files import is_odd
+from bifocal.model import Interior, Photo, PhotoAlone
 from bifocal.orientation.adjustment.pair_adjustment import ROUNDING, as_one
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.facade_lines import facing_wall
@@ -22,8 +20,7 @@ from bifocal.remarks import remark
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, ByteArray, FloatArray, positive
-from photocore.camera import pinhole
-from photocore.camera.pinhole import PARAMETERS, Pinhole, ray_on_plane
+from photocore.camera import PARAMETERS, Pinhole, pinhole, ray_on_plane
 from photocore.errors import ConvergenceError, GeometryError, InputError
 from photocore.remarks import keys_in
 

@@ -8,11 +8,10 @@ from itertools import chain
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.interior_orientation import Cameras
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import Cameras, PairMedia
 from bifocal.precision import base_factor
 from bifocal.remarks import remark
-from photocore.camera.pinhole import Pinhole
+from photocore.camera import Pinhole
 from photocore.remarks import Remark
 
 

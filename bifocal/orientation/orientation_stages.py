@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.matching.features import Features
-from bifocal.model.interior_orientation import SIGMA_RADIAL, Cameras, Images, Interior
-from bifocal.model.world_frame import WorldFrame
+from bifocal.matching import Features
+from bifocal.model import SIGMA_RADIAL, Cameras, Images, Interior, WorldFrame
 from bifocal.orientation import facade_lines, validation
 from bifocal.orientation.adjustment.frame_turn import family_test, line_test
 from bifocal.orientation.adjustment.pair_adjustment import (
@@ -51,7 +50,7 @@ from bifocal.orientation.walls.wall_shape import WallShape
 from bifocal.remarks import remark
 from photocore.adjustment.outliers import robust_sigma
 from photocore.arrays import ByteArray, FloatArray
-from photocore.camera.pinhole import plane_transfer
+from photocore.camera import plane_transfer
 from photocore.errors import GeometryError
 
 #: "Image plane parallel to the wall" when nothing contradicts it. [rad]

@@ -7,10 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bifocal.files.haze import greys_through_water
-from bifocal.model.image import as_grey
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.pair_media import PairMedia
+from bifocal.files import greys_through_water
+from bifocal.model import Interior, PairMedia, as_grey
 from bifocal.orientation.absolute_orientation import orient_pair
 from bifocal.orientation.alignment import Alignment, make_alignment
 from bifocal.orientation.as_set_up import pair_as_set_up

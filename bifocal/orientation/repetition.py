@@ -13,13 +13,12 @@ import cv2
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
 
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Images, Interiors
+from bifocal.model import Images, Interiors, apply_homography
 from bifocal.orientation.area_points import resampled
 from bifocal.orientation.starts.relative_orientation import Surrounding, Ties
 from bifocal.orientation.tuning import REPETITION
 from photocore.arrays import BoolArray, Float32Array, FloatArray
-from photocore.camera.pinhole import Pinhole, plane_from_pixel, project
+from photocore.camera import Pinhole, plane_from_pixel, project
 
 Sheet = tuple[Float32Array, BoolArray]
 

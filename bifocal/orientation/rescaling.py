@@ -12,11 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from bifocal.model.doubts import LENGTHS, MISFITS, RIVALS, doubts_of
-from bifocal.model.length_checks import length_on_wall
-from bifocal.model.orientation_precision import CAMERA, NAMES, pinhole
-from bifocal.model.pair import Pair
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import (
+    CAMERA,
+    LENGTHS,
+    MISFITS,
+    NAMES,
+    RIVALS,
+    Pair,
+    PairMedia,
+    doubts_of,
+    length_on_wall,
+    pinhole,
+)
 from bifocal.orientation.alignment import aside, deviations_of
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.orientation_report import orientation_in_words

@@ -8,9 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from bifocal.files.exif_judge import is_odd
-from bifocal.model.hypotheses import COORDINATES, picks_meant
-from bifocal.model.interior_orientation import Cameras, Interiors
+from bifocal.files import is_odd
+from bifocal.model import COORDINATES, Cameras, Interiors, picks_meant
 from bifocal.orientation.control_points import Control, SiteMeasures
 from bifocal.orientation.tuning import SLIPS
 from bifocal.remarks import remark

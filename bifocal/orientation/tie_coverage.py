@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifocal.model.diagnostics import CommonPoints, TieCells
-from bifocal.model.interior_orientation import Interior
+from bifocal.model import CommonPoints, Interior, TieCells
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairObservations
 from photocore.arrays import FloatArray

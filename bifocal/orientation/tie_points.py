@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.matching.patches import refine, same_scale
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Cameras, Images, Interiors
+from bifocal.matching import refine, same_scale
+from bifocal.model import Cameras, Images, Interiors, apply_homography
 from bifocal.orientation.adjustment import refracted_ties
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair, wall_equations
@@ -18,7 +17,7 @@ from bifocal.orientation.tuning import TIES, WALLS
 from bifocal.orientation.walls.reference_plane import NarrowFace, narrow_face
 from photocore.adjustment import OUTLIER_LIMIT
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import (
+from photocore.camera import (
     fundamental,
     homogeneous,
     plane_transfer,

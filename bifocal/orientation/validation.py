@@ -5,11 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.matching.features import sharpness
-from bifocal.model.homography import apply_homography
+from bifocal.matching import sharpness
+from bifocal.model import FARTHEST_WALL, Cameras, Images, Interior, Interiors, apply_homography
 from bifocal.model.hypotheses import FACTORS, unit_of
-from bifocal.model.interior_orientation import Cameras, Images, Interior, Interiors
-from bifocal.model.photo import FARTHEST_WALL
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.starts.relative_orientation import Ties, rotation_only

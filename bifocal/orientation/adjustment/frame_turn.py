@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bifocal.model.orientation_precision import CAMERA, NAMES
+from bifocal.model import CAMERA, NAMES
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,
     PairObservations,
@@ -20,9 +20,7 @@ from bifocal.orientation.adjustment.pair_observations import (
 )
 from bifocal.orientation.facade_lines import FacadeDirection
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import Pinhole
-from photocore.camera.rotation import rotation_from_vector, skew
-from photocore.camera.similarity import Similarity
+from photocore.camera import Pinhole, Similarity, rotation_from_vector, skew
 
 #: Moves of the frame that change less, as a share of what moves most, are held by nothing.
 _LEAST = 1e-12

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import chdtrc, ndtri
 
-from bifocal.model.orientation_precision import NAMES, rates_of
+from bifocal.model import NAMES, rates_of
 from bifocal.orientation.adjustment.frame_turn import line_equations, turned_by_lines
 from bifocal.orientation.adjustment.observed_points import known_points, views_of
 from bifocal.orientation.adjustment.pair_observations import (
@@ -25,13 +25,13 @@ from bifocal.orientation.adjustment.refracted_ties import height_equations, meet
 from bifocal.remarks import remark
 from photocore.adjustment.network import Network, NetworkState, Rows
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import (
+from photocore.camera import (
     PARAMETERS,
     fundamental_with_jacobian,
     homogeneous,
     plane_transfer_with_jacobian,
+    skew,
 )
-from photocore.camera.rotation import skew
 from photocore.errors import GeometryError
 
 #: Rounding error of pixels and metres, as a share of their standard deviations.

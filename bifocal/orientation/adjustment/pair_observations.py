@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bifocal.model.interior_orientation import Cameras, Interiors
-from bifocal.model.orientation_precision import CAMERA, NAMES
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import CAMERA, NAMES, Cameras, Interiors, PairMedia
 from bifocal.orientation.control_points import Control
 from bifocal.orientation.facade_lines import FacadeDirection
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.distortion import RadialDivision
+from photocore.camera import RadialDivision
 
 #: Ties count as so many independent ones: their errors are smooth over the photo. With 700 the
 #: fitted offset, slopes and scale of relief were up to 2.2 of their sigma off, with 100 0.4 to 1.4.

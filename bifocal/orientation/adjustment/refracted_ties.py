@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bifocal.model.orientation_precision import rates_of
+from bifocal.model import rates_of
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import (
     Equations,

@@ -10,12 +10,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Images
+from bifocal.model import Images, apply_homography
 from bifocal.orientation.starts.relative_orientation import Ties
 from bifocal.orientation.tuning import ORDER
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import homogeneous
+from photocore.camera import homogeneous
 
 
 def first_is_far(images: Images, ties: Ties) -> float:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifocal.matching.features import Features
+from bifocal.matching import Features
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
 from bifocal.orientation.approximate_orientation import Given, scaled
@@ -18,7 +18,7 @@ from bifocal.orientation.starts.relative_orientation import Ties, find_ties, fir
 from bifocal.orientation.tuning import STAGES
 from bifocal.orientation.walls.wall_shape import straightened
 from bifocal.remarks import remark
-from photocore.camera.pinhole import Pinhole, ray_on_plane
+from photocore.camera import Pinhole, ray_on_plane
 from photocore.errors import GeometryError
 
 

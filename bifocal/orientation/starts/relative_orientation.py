@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bifocal.matching.features import (
+from bifocal.matching import (
     Features,
     alike,
     drop_repeated,
@@ -21,12 +21,11 @@ from bifocal.matching.features import (
     match_features,
     spread_evenly,
 )
-from bifocal.model.homography import apply_homography
-from bifocal.model.interior_orientation import Cameras, Interiors
+from bifocal.model import Cameras, Interiors, apply_homography
 from bifocal.orientation.tuning import TIES
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import Pinhole, fundamental, homogeneous, triangulate
+from photocore.camera import Pinhole, fundamental, homogeneous, triangulate
 from photocore.errors import GeometryError
 
 

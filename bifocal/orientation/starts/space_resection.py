@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 
 from bifocal import rays
-from bifocal.model.interior_orientation import Interior
-from bifocal.model.pair_media import PairMedia
+from bifocal.model import Interior, PairMedia
 from bifocal.orientation.tuning import RESECTION
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import Pinhole, camera_matrix, cameras_seeing, project
+from photocore.camera import Pinhole, camera_matrix, cameras_seeing, project
 from photocore.errors import GeometryError
 
 

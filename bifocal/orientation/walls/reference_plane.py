@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifocal.model.interior_orientation import Cameras, Interior, Interiors
+from bifocal.model import Cameras, Interior, Interiors
 from bifocal.orientation.control_points import SiteMeasures
 from bifocal.orientation.tuning import WALLS
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray, IntArray
-from photocore.camera.rotation import rotation_from_vector
+from photocore.camera import rotation_from_vector
 from photocore.errors import GeometryError
 
 

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from bifocal.model.doubts import MOST_BENT, shape_is_certain
-from bifocal.model.homography import apply_homography
+from bifocal.model import MOST_BENT, apply_homography, shape_is_certain
 from bifocal.orientation.adjustment.observed_points import views_of
 from bifocal.orientation.adjustment.pair_adjustment import AdjustedPair
 from bifocal.orientation.adjustment.pair_observations import PairUnknowns
@@ -20,7 +19,7 @@ from bifocal.orientation.tuning import BEND, WALLS
 from bifocal.orientation.walls.reference_plane import faces
 from bifocal.remarks import remark
 from photocore.arrays import BoolArray, FloatArray
-from photocore.camera.pinhole import project
+from photocore.camera import project
 from photocore.errors import GeometryError
 
 
