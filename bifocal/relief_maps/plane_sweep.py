@@ -153,7 +153,7 @@ def swept(frame: Frame, box: Box, tried: Hypotheses) -> Swept:
     total = semi_global.aggregated(
         cost, frame.image1[box], one_step=SWEEP.one_step, jump=SWEEP.jump, softness=SWEEP.softness
     )
-    best = total.argmin(1)
+    best = _best(total)
     least, shift = _lowest(total, best)
     number = np.full(cost.shape[1], np.nan)
     number[slots] = tried.numbers
@@ -173,6 +173,16 @@ def misfit(frame: Frame, box: Box, relief: Float32Array) -> Float32Array:
     moved = cv2.remap(frame.image2, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     cost = _costs(_bordered(frame.image1, box), moved[None], np.zeros(1, np.int64))
     return cv2.blur(cost[:, 0].astype(np.float32), (3, 3))
+
+
+def _best(total: semi_global.Costs) -> NDArray[np.intp]:
+    """Return the first of the labels of least cost, (height, width): `argmin(1)`, but faster."""
+    least, best = total[:, 0].copy(), np.zeros((len(total), total.shape[2]), np.int16)
+    for label in range(1, total.shape[1]):
+        cost = total[:, label]
+        np.maximum(best, (cost < least) * np.int16(label), out=best)
+        np.minimum(least, cost, out=least)
+    return best.astype(np.intp)
 
 
 def _lowest(total: semi_global.Costs, best: NDArray[np.intp]) -> tuple[Float32Array, Float32Array]:

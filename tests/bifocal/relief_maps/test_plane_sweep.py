@@ -194,3 +194,9 @@ def test_a_rail_hides_by_its_face_where_the_wall_behind_it_is_measured():
         assert hidden[face].all()
         assert hidden[below].all() != measured
         assert hidden[below].any() != measured
+
+
+@pytest.mark.parametrize("labels", [1, 7, 300])
+def test_the_first_of_the_least_labels_is_chosen(labels):
+    total = np.random.default_rng(3).integers(0, 40, (9, labels, 11)).astype(np.int16)
+    assert np.array_equal(plane_sweep._best(total), total.argmin(1))
