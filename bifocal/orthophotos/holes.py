@@ -19,8 +19,9 @@ def close_holes(
 ) -> None:  # fmt: skip
     """Fill holes of a window with texture, in place; those of more than ``largest`` [m2] white.
 
-    The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too, and as narrow a
-    sliver within it is white: a ragged outline would tell of the mask, not of the wall. Texture is
+    The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too, as narrow a
+    sliver within it is white, and its outline smooth: ragged it would tell of the mask, not of the
+    wall. Texture is
     a copy of what lies beside, shifted to where the rim fits best, and levelled along the rim. It
     comes from what lies no farther out than the hole: that is what goes on behind. Specks take the
     mean colour of their rim.
@@ -31,7 +32,7 @@ def close_holes(
     # What the fringe leaves of one may be a crumb.
     white = parts_of(cv2.morphologyEx(large, cv2.MORPH_OPEN, disc) > 0, largest / 2 / gsd**2)
     if white.any():
-        white = _without_slivers(white, relief, disc)
+        white = _outlined(white, holes, relief, side)
     image[white] = np.iinfo(image.dtype).max
     source[white] = Source.NEITHER
     rest = (holes & ~white).astype(np.uint8)
@@ -42,14 +43,17 @@ def close_holes(
         _copy_texture(image, source, label, number, (left, top, width, height), relief, gsd)
 
 
-def _without_slivers(white: BoolArray, relief: Float32Array, disc: ByteArray) -> BoolArray:
-    """Return white parts with what is narrower than a disc within them, unless it lies before.
+def _outlined(white: BoolArray, holes: BoolArray, relief: Float32Array, side: int) -> BoolArray:
+    """Return white parts with a smooth outline, and without slivers of wall within them.
 
-    A sliver of wall between two parts that no photo sees is seen by chance, a bar is not.
+    A sliver of wall between two parts that no photo sees is seen by chance, and a ragged outline
+    is the matcher's. What lies before a part, such as a bar, is left alone.
     """
-    closed = cv2.morphologyEx(white.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    closed = cv2.morphologyEx(white.astype(np.uint8), cv2.MORPH_CLOSE, disc)
+    smooth = cv2.GaussianBlur(closed.astype(np.float32), (0, 0), HOLES.smooth * side) > 0.5
     level = cv2.dilate(np.where(white, relief, np.float32(-np.inf)), disc)
-    return np.asarray(white | (closed & (relief < level + np.float32(HOLES.before))))
+    return np.asarray(smooth & (holes | (relief < level + np.float32(HOLES.before))))
 
 
 def _close_specks(

@@ -81,6 +81,8 @@ class HolesTuning:
     largest: float = 0.05
     #: But for their fringe, parts of them narrower than this. [m]
     narrow: float = 0.06
+    #: Their outline is smoothed by this share of that, which keeps the narrowest of them.
+    smooth: float = 0.6
     #: Holes of no more take the mean colour of their rim, unseen on paper. [px]
     speck: int = 25
     #: Breadth of the rim at which a copy must fit. [px]

@@ -179,3 +179,18 @@ def test_a_sliver_within_what_no_photo_sees_is_white_but_a_bar_before_it_is_draw
     shown = Source.IMAGE_1 if before else Source.NEITHER
     assert (source[15:45, 28:31] == shown).all()
     assert (image[15:45, 28:31] == (90 if before else 255)).all()
+
+
+def test_what_no_photo_sees_has_a_smooth_outline():
+    image, relief = np.full((80, 140), 90, np.uint8), np.zeros((80, 140), np.float32)
+    holes = np.zeros((80, 140), bool)
+    # Teeth of 4 px every 14 px along the upper side.
+    for column in range(10, 130):
+        holes[24 - 4 * (column // 7 % 2) : 60, column] = True
+    source = np.where(holes, Source.NONE, Source.IMAGE_1).astype(np.uint8)
+    close_holes(image, source, holes, relief, GSD, largest=0.05)
+    white = source == Source.NEITHER
+    top = white[:, 24:116].argmax(axis=0)
+    assert np.ptp(top) <= 2
+    assert (white.sum() / holes.sum()) > 0.9
+    assert (source[holes & ~white] == Source.FILLED).all()
