@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from bifocal.model.relief_map import Quality
 from bifocal.relief_maps import edges, flow
 from bifocal.relief_maps.forward_projection import MapBands
 from bifocal.relief_maps.frame import Frame
@@ -41,6 +42,8 @@ class SmoothingTuning:
     thin: int = 9
     #: It stands out by more than this. [m]
     stands_out: float = 0.1
+    #: Medians more at steps that were not measured.
+    repeats: int = 5
 
 
 SMOOTHING = SmoothingTuning()
@@ -66,16 +69,26 @@ def straightened(bands: MapBands) -> MapBands:
     """Return a relief map whose steps run straight: a 5 x 5 median there, nothing elsewhere.
 
     Single pixels on the wrong side of a step cast shadows of their own; the median took the share
-    of wrong pixels from 2.05 to 1.91 % and made hidden pixels found right 76 instead of 67 %.
+    of wrong pixels from 2.05 to 1.91 % and made hidden pixels found right 76 instead of 67 %. Where
+    a step was not measured it is repeated: there teeth are the matcher's.
     """
+    straight, thin = _straighter(bands.r)
     filled = np.where(np.isfinite(bands.r), bands.r, np.float32(0))
-    step = steps(bands.r, 5)
-    straight = np.where(step, cv2.medianBlur(filled, 5), bands.r)
-    # Of thin things a median of 5 x 5 leaves little.
+    straight = np.where(thin, cv2.medianBlur(filled, 3), straight)
+    made_up = bands.quality != Quality.MEASURED
+    for _ in range(SMOOTHING.repeats):
+        again, thin = _straighter(straight)
+        straight = np.where(made_up & ~thin, again, straight)
+    return bands._replace(r=straight)
+
+
+def _straighter(relief: Float32Array) -> tuple[Float32Array, BoolArray]:
+    """Return relief with a 5 x 5 median at steps, and thin things, of which it leaves little."""
+    filled = np.where(np.isfinite(relief), relief, np.float32(0))
+    step = steps(relief, 5)
     body = cv2.morphologyEx(filled, cv2.MORPH_OPEN, np.ones((SMOOTHING.thin,) * 2, np.uint8))
     thin = step & (filled - body > SMOOTHING.stands_out)
-    straight = np.where(thin, cv2.medianBlur(filled, 3), straight)
-    return bands._replace(r=straight)
+    return np.where(step, cv2.medianBlur(filled, 5), relief), thin
 
 
 def steps(relief: Float32Array, side: int = 3) -> BoolArray:

@@ -18,6 +18,7 @@ from bifocal.relief_maps import (
     levels,
     occluded_regions,
     occluding_edges,
+    smoothing,
     snapping,
     stages,
 )
@@ -459,3 +460,16 @@ def test_a_lost_region_that_camera_2_would_see_is_left_alone():
     relief[:, 160:240], loop[:, 160:240] = 0.3, 60.0
     mended = occluded_regions.put_behind(frame, relief, looping(loop), loop == 0)
     np.testing.assert_array_equal(mended, relief)
+
+
+def test_teeth_of_a_step_go_where_nobody_measured_it():
+    rng, relief = np.random.default_rng(3), np.zeros((200, 120), np.float32)
+    for row in range(200):
+        relief[row, : 60 + rng.integers(0, 7)] = 0.8
+    teeth = {}
+    for quality in (Quality.MEASURED, Quality.HIDDEN):
+        bands = MapBands(relief, np.zeros_like(relief), np.full(relief.shape, quality, np.uint8))
+        straight = smoothing.straightened(bands).r
+        assert np.isin(straight, np.float32([0, 0.8])).all()
+        teeth[quality] = np.count_nonzero(np.diff(straight > 0.4, axis=0))
+    assert teeth[Quality.HIDDEN] < 0.6 * teeth[Quality.MEASURED], teeth
