@@ -21,10 +21,9 @@ def close_holes(
 
     The fringe of a large one, narrower than `HOLES.narrow`, takes texture, too, as narrow a
     sliver within it is white, and its outline smooth: ragged it would tell of the mask, not of the
-    wall. Texture is
-    a copy of what lies beside, shifted to where the rim fits best, and levelled along the rim. It
-    comes from what lies no farther out than the hole: that is what goes on behind. Specks take the
-    mean colour of their rim.
+    wall. Texture is a copy of what lies beside, shifted to where the rim fits best, and levelled
+    along the rim. It comes from what lies no farther out than the hole: that is what goes on
+    behind. Specks take the mean colour of their rim.
     """
     side = int(HOLES.narrow / gsd) | 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
